@@ -1,0 +1,34 @@
+"""viewcell: from-region visibility for buildings, with a proof on both sides of every answer.
+
+Names are imported on first use: Warp and JAX take seconds to import and `viewcell --help` must not.
+"""
+
+from importlib import import_module
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Bake": "viewcell.data.database",
+    "InputError": "viewcell.data.errors",
+    "Scene": "viewcell.data.scene",
+    "Verdict": "viewcell.data.verdict",
+    "bake": "viewcell.workbench.bake",
+    "load": "viewcell.data.database",
+    "make_office": "viewcell.data.buildings.office",
+    "read": "viewcell.data.readers",
+    "report": "viewcell.workbench.report",
+    "verify": "viewcell.workbench.verify",
+}
+
+__all__ = ["Bake", "InputError", "Scene", "Verdict", "bake", "load", "make_office", "read", "report", "verify"]
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name where it lives, the first time it is asked for (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'viewcell' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME])

@@ -1,0 +1,1 @@
+"""Synthetic buildings, seeded and of any size."""

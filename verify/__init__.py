@@ -1,0 +1,1 @@
+"""Truth: exact twins, sampled rays, certificates, report."""

@@ -1,0 +1,1 @@
+"""Speed against error: every timing row carries its error columns."""
