@@ -14,12 +14,12 @@ import numpy as np
 from .errors import InputError
 
 GRID_M = 2.0**-10
-# Coordinate differences stay below 2**25, so the products the stabbing kernel forms are exact in float64 (docs/decisions).
+# Coordinate differences stay below 2**25, so the products that the stabbing kernel forms are exact in float64.
 GRID_LIMIT = 2**24
 
 
 class Role(StrEnum):
-    """What a part does to visibility: OCCLUDER shapes cells and portals, DETAIL only blocks rays, TRANSPARENT neither."""
+    """OCCLUDER shapes cells and portals and blocks rays, DETAIL only blocks rays, TRANSPARENT does neither."""
 
     OCCLUDER = "occluder"
     DETAIL = "detail"
@@ -54,8 +54,7 @@ class Instance:
     """A placed definition, called an *object* in the tables; its object_id is its place in `Scene.objects`.
 
     Attributes:
-        transform: definition frame to the scene frame (metres, relative to `Scene.origin`, Z up), shape (4, 4), float64.
-
+        transform: definition frame to scene frame (metres from `Scene.origin`, Z up), shape (4, 4), float64.
     """
 
     name: str

@@ -1,1 +1,1 @@
-"""placeholder"""
+"""Model readers: IFC and meshes."""
