@@ -1,0 +1,55 @@
+"""The cell-and-portal graph: boxes that tile space, joined by axial rectangles.
+
+Source: Funkhouser et al. 1996, section 3.1 (cells, portals, adjacency graph).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+OTHER_AXES = np.array([[1, 2], [0, 2], [0, 1]])
+
+
+@dataclass
+class CellGraph:
+    """Cells, portals and the opaque rest of the cells' faces, all in grid steps.
+
+    Attributes:
+        cells: boxes (low, high corner), shape (cells, 2, 3), int32. They never overlap.
+        inhabitable: cells an observer may stand in, shape (cells,), bool.
+        cell_names: shape (cells,), str.
+        portal_cells: (low side, high side) cell of each portal, shape (portals, 2), int32.
+        portal_axis: the axis that the portal is perpendicular to, shape (portals,), int8.
+        portals: flat boxes (low, high corner), shape (portals, 2, 3), int32; low == high on `portal_axis`.
+    """
+
+    cells: np.ndarray
+    inhabitable: np.ndarray
+    cell_names: np.ndarray
+    portal_cells: np.ndarray
+    portal_axis: np.ndarray
+    portals: np.ndarray
+
+    @property
+    def cell_count(self) -> int:
+        """Number of cells."""
+        return len(self.cells)
+
+    @property
+    def portal_count(self) -> int:
+        """Number of portals."""
+        return len(self.portals)
+
+    def adjacency(self) -> tuple[np.ndarray, np.ndarray]:
+        """Portals of each cell, as rows of a compressed table.
+
+        Returns:
+            starts, shape (cells + 1,), int32, and entries, shape (2 portals, 2), int32: (portal, cell behind it) of
+            cell c are entries[starts[c]:starts[c + 1]], ascending by portal.
+        """
+        here = self.portal_cells.T.ravel()
+        there = self.portal_cells[:, ::-1].T.ravel()
+        portal = np.tile(np.arange(self.portal_count), 2)
+        order = np.lexsort((portal, here))
+        starts = np.searchsorted(here[order], np.arange(self.cell_count + 1))
+        return starts.astype(np.int32), np.column_stack([portal[order], there[order]]).astype(np.int32)
