@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from viewcell.data.errors import InputError
 from viewcell.verify.sightline import Sight, Sightlines, closed_objects
 
+OCTANTS = list(product((1, -1), repeat=3))
 UNIT = np.array([[0, 0, 0], [8, 0, 0], [0, 8, 0]])
 CORNERS = np.array(list(product((0, 1), repeat=3)))
 SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -142,6 +143,14 @@ def test_oblique_solid():
     sure = np.abs(least) > 1e-9
     assert (Sightlines(triangles).outside_solids(points)[sure] == (least < 0)[sure]).all()
     assert not Sightlines(triangles).outside_solids(corners.astype(float)).any()
+
+
+def test_columns_through_edges_and_vertices():
+    """The inside of an octahedron is |x| + |y| + |z| < 6; columns above integer points hit its ridges and its top."""
+    tips = np.array([[6, 0, 0], [0, 6, 0], [0, 0, 6]])
+    triangles = [tips * s if np.prod(s) > 0 else (tips * s)[::-1] for s in (np.array(o)[:, None] for o in OCTANTS)]
+    points = np.array(list(product(range(-7, 8), repeat=3)), float)
+    assert (Sightlines(np.array(triangles)).outside_solids(points) == (np.abs(points).sum(axis=1) > 6)).all()
 
 
 def test_nothing_blocks_where_there_is_nothing():
