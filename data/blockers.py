@@ -1,0 +1,146 @@
+"""Blockers: large flat rectangles that no sightline between live cells can cross.
+
+On the plane x_i = k a sightline that stays in live cells can pass only through the open cross-section of a cell or
+through a portal on the plane. Everything else is blocked: opaque faces, the inside of solids, dead cells. Merging all of
+it on one plane before cutting it into *maximal, overlapping* rectangles is what makes single blockers strong: a wall's
+face has a gap where another wall joins it, the blocked region has none.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .graph import OTHER_AXES, CellGraph
+
+
+@dataclass
+class Blockers:
+    """Rectangles that block, and a bounding volume hierarchy over them in depth-first order.
+
+    Attributes:
+        boxes: flat boxes [grid steps], shape (blockers, 2, 3), int32, in the order of the leaves.
+        axis: the axis each is perpendicular to, shape (blockers,), int32.
+        node_boxes: shape (nodes, 2, 3), int32.
+        node_links: shape (nodes, 2), int32: (node to go to when this one is missed or done, blocker of a leaf or -1).
+    """
+
+    boxes: np.ndarray
+    axis: np.ndarray
+    node_boxes: np.ndarray
+    node_links: np.ndarray
+
+
+def find_blockers(graph: CellGraph) -> Blockers:
+    """Blockers of every plane that holds a cell face; each opaque piece of a face lies in at least one of them."""
+    pieces, axes = [], []
+    for axis in range(3):
+        planes = np.unique(graph.cells[:, :, axis])
+        low = np.argsort(graph.cells[:, 0, axis], kind="stable")
+        starts = graph.cells[low, 0, axis]
+        for k in planes:
+            # Cells are few on a plane; the sorted lows cut the candidates to those that begin at or before it.
+            near = low[: np.searchsorted(starts, k, side="right")]
+            near = near[graph.cells[near, 1, axis] >= k]
+            rectangles = _plane_blockers(graph, axis, int(k), near)
+            if len(rectangles):
+                u, v = OTHER_AXES[axis]
+                boxes = np.full((len(rectangles), 2, 3), k, np.int32)
+                boxes[:, :, u], boxes[:, :, v] = rectangles[:, :, 0], rectangles[:, :, 1]
+                pieces.append(boxes)
+                axes.append(np.full(len(boxes), axis, np.int32))
+    boxes = np.concatenate(pieces) if pieces else np.zeros((0, 2, 3), np.int32)
+    order, node_boxes, node_links = build_hierarchy(boxes)
+    axis_of = np.concatenate(axes) if axes else np.zeros(0, np.int32)
+    return Blockers(boxes[order], axis_of[order], node_boxes, node_links)
+
+
+def _plane_blockers(graph: CellGraph, axis: int, k: int, near: np.ndarray) -> np.ndarray:
+    """Maximal blocked rectangles of one plane that hold part of a live cell's opaque face; shape (n, 2, 2), int32."""
+    uv = OTHER_AXES[axis]
+    cells = graph.cells[near]
+    faces = cells[(cells[:, 0, axis] == k) | (cells[:, 1, axis] == k)][:, :, uv]
+    through = cells[(cells[:, 0, axis] < k) & (cells[:, 1, axis] > k)][:, :, uv]
+    on_plane = (graph.portal_axis == axis) & (graph.portals[:, 0, axis] == k)
+    gaps = np.concatenate([through, graph.portals[on_plane][:, :, uv]])
+    us, vs = np.unique(np.concatenate([faces, gaps])[:, :, 0]), np.unique(np.concatenate([faces, gaps])[:, :, 1])
+    blocked = ~paint(gaps, us, vs)
+    wanted = paint(faces, us, vs) & blocked
+    return maximal_rectangles(blocked, wanted, us, vs)
+
+
+def paint(rectangles: np.ndarray, us: np.ndarray, vs: np.ndarray) -> np.ndarray:
+    """Raster cells covered by any of the rectangles (n, 2, 2), whose corners are all in us and vs; bool."""
+    heights = np.zeros((len(us), len(vs)), np.int32)
+    u = np.searchsorted(us, rectangles[:, :, 0])
+    v = np.searchsorted(vs, rectangles[:, :, 1])
+    for i, j, sign in ((0, 0, 1), (0, 1, -1), (1, 0, -1), (1, 1, 1)):
+        np.add.at(heights, (u[:, i], v[:, j]), sign)
+    return heights.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
+
+
+def maximal_rectangles(blocked: np.ndarray, wanted: np.ndarray, us: np.ndarray, vs: np.ndarray) -> np.ndarray:
+    """Rectangles inside `blocked` that cannot grow and together cover `wanted`; shape (n, 2, 2), int32."""
+    found: set[tuple[int, int, int, int]] = set()
+    left = wanted.copy()
+    for i, j in np.argwhere(wanted):
+        if left[i, j]:
+            for first in (0, 1):
+                u0, u1, v0, v1 = grow(blocked, int(i), int(j), first)
+                left[u0:u1, v0:v1] = False
+                found.add((u0, u1, v0, v1))
+    if not found:
+        return np.zeros((0, 2, 2), np.int32)
+    u0, u1, v0, v1 = np.array(sorted(found)).T
+    return np.stack([np.stack([us[u0], vs[v0]], axis=1), np.stack([us[u1], vs[v1]], axis=1)], axis=1).astype(np.int32)
+
+
+def grow(blocked: np.ndarray, i: int, j: int, first: int) -> tuple[int, int, int, int]:
+    """Grow raster cell (i, j) inside `blocked`, along axis `first` before the other: u0, u1, v0, v1 (past the end)."""
+    if first == 1:
+        v0, v1, u0, u1 = grow(blocked.T, j, i, 0)
+        return u0, u1, v0, v1
+    u0, u1 = _run(blocked[:, j], i)
+    v0, v1 = _run(blocked[u0:u1].all(axis=0), j)
+    return u0, u1, v0, v1
+
+
+def _run(row: np.ndarray, i: int) -> tuple[int, int]:
+    """The run of true values around i: first and past-the-last index."""
+    after = np.flatnonzero(~row[i:])
+    before = np.flatnonzero(~row[:i])
+    return (int(before[-1]) + 1 if len(before) else 0), (i + int(after[0]) if len(after) else len(row))
+
+
+def build_hierarchy(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Median-split hierarchy in depth-first order, walked without a stack.
+
+    Returns:
+        order of the boxes, shape (n,), and nodes as in `Blockers`; one box a leaf.
+    """
+    order: list[int] = []
+    node_boxes: list[np.ndarray] = []
+    links: list[list[int]] = []
+    centres = boxes.astype(np.int64).sum(axis=1)
+    # (members, None) opens a node; (None, node) closes it and sets where a miss goes.
+    todo: list[tuple[np.ndarray | None, int]] = [(np.arange(len(boxes)), -1)] if len(boxes) else []
+    while todo:
+        members, node = todo.pop()
+        if members is None:
+            links[node][0] = len(links)
+            continue
+        node = len(links)
+        node_boxes.append(np.stack([boxes[members, 0].min(axis=0), boxes[members, 1].max(axis=0)]))
+        links.append([-1, -1])
+        todo.append((None, node))
+        if len(members) == 1:
+            links[node][1] = len(order)
+            order.append(int(members[0]))
+        else:
+            axis = int(np.ptp(centres[members], axis=0).argmax())
+            members = members[np.argsort(centres[members, axis], kind="stable")]
+            todo += [(members[len(members) // 2 :], -1), (members[: len(members) // 2], -1)]
+    return (
+        np.array(order, np.int64),
+        np.array(node_boxes, np.int32).reshape(-1, 2, 3),
+        np.array(links, np.int32).reshape(-1, 2),
+    )

@@ -1,0 +1,361 @@
+"""Target search: is there a sightline from one box to another, past every blocker?
+
+A branch-and-bound over lines instead of portal sequences. Take the middle line of what is still possible and look up the
+blockers it crosses between source and target. None: VISIBLE, and the line is the witness. Else the line must pass
+blocker R on one of its four sides, and "crosses the plane of R below its low edge" is one more linear row of the
+stabbing system (kernels/stab.py): four children, disjoint, most of them empty at once. No child left: HIDDEN. Open
+space costs nothing however finely it was cut into cells, which is where portal sequences explode.
+
+The blocker is the one that covers most of the shaft between the two boxes, not the first one met: a slab between two
+storeys ends the search at its root.
+"""
+
+import warp as wp
+
+from .graph import reflect_high, reflect_low
+from .stab import (
+    AT_M,
+    AT_W,
+    HIDDEN,
+    LEVEL_SIZE,
+    LIST_CAPACITY,
+    LISTS_SIZE,
+    STABBED,
+    UNDECIDED,
+    append_box,
+    append_entry,
+    decide,
+    offsets,
+    start_level,
+    vec6d,
+    vec6i,
+)
+
+wp.set_module_options({"enable_backward": False})
+
+f64 = wp.float64
+
+MAX_BRANCHES = wp.constant(60)
+SLOT_SIZE = wp.constant((60 + 2) * (27 + 1 + 4 * 24) + 6 * 96 * 2 + 2 * (1 + 4 * 24) + 8)
+# Integers a level: blocker, cursor, order of the four sides, six row counts.
+FRAME = wp.constant(9)
+
+
+@wp.struct
+class BlockerTree:
+    """Blockers and their hierarchy as Warp arrays (see data/blockers.py)."""
+
+    lo: wp.array(dtype=wp.vec3i)
+    hi: wp.array(dtype=wp.vec3i)
+    axis: wp.array(dtype=int)
+    node_lo: wp.array(dtype=wp.vec3i)
+    node_hi: wp.array(dtype=wp.vec3i)
+    links: wp.array(dtype=wp.vec2i)
+
+
+@wp.struct
+class Pairs:
+    """Work: boxes, and rows (source box, target box, strict) to join; strict leaves out blockers at the target's face."""
+
+    lo: wp.array(dtype=wp.vec3i)
+    hi: wp.array(dtype=wp.vec3i)
+    rows: wp.array(dtype=wp.vec3i)
+
+
+@wp.struct
+class Answers:
+    """Per pair: verdict (0 hidden, 1 visible, 2 unknown), nodes spent, octant and line (w, xi) of a visible pair."""
+
+    verdict: wp.array(dtype=wp.uint8)
+    nodes: wp.array(dtype=int)
+    octant: wp.array(dtype=int)
+    line: wp.array(dtype=wp.vec3d)
+    offset: wp.array(dtype=wp.vec3d)
+
+
+@wp.func
+def possible_octant(s_lo: wp.vec3i, s_hi: wp.vec3i, t_lo: wp.vec3i, t_hi: wp.vec3i, octant: int) -> bool:
+    """Whether a line of this octant can lead from box s to box t."""
+    for i in range(3):
+        if ((octant >> i) & 1) == 1:
+            if t_lo[i] >= s_hi[i]:
+                return False
+        else:
+            if t_hi[i] <= s_lo[i]:
+                return False
+    return True
+
+
+@wp.func
+def side_share(crossing: f64, edge: f64, shaft: f64) -> f64:
+    """How much of the way from the crossing to the shaft's side the blocker covers, at most 1; all lengths positive."""
+    reach = wp.abs(edge - crossing)
+    need = wp.abs(shaft - crossing)
+    if reach >= need:
+        return f64(1.0)
+    return reach / need
+
+
+@wp.func
+def shaft_bounds(v0: f64, v1: f64, x0: f64, x1: f64, k: f64, vlo: f64, vhi: f64, xlo: f64, xhi: f64) -> wp.vec2d:
+    """Bounds on one axis, at plane k of another, of all segments from [v0, v1] x [vlo, vhi] to [x0, x1] x [xlo, xhi].
+
+    Steers the choice of blocker only. Source: the crossing rectangle of a shaft with a plane.
+    """
+    if k < v1 or k > x0 or x0 <= v1:
+        return wp.vec2d(wp.min(vlo, xlo), wp.max(vhi, xhi))
+    s = f64(0.0)
+    if x1 > v1:
+        s = (k - v1) / (x1 - v1)
+    t = f64(1.0)
+    if x0 > v0:
+        t = (k - v0) / (x0 - v0)
+    low = wp.min(vlo + s * (xlo - vlo), vlo + t * (xlo - vlo))
+    high = wp.max(vhi + s * (xhi - vhi), vhi + t * (xhi - vhi))
+    return wp.vec2d(low, high)
+
+
+@wp.func
+def shares(
+    lo: wp.vec3d, hi: wp.vec3d, axis: int, point: wp.vec3d, s_lo: wp.vec3d, s_hi: wp.vec3d, t_lo: wp.vec3d, t_hi: wp.vec3d
+) -> wp.vec4d:
+    """Share of the shaft that a blocker covers towards its sides (u low, u high, v low, v high)."""
+    out = wp.vec4d()
+    for side_axis in range(2):
+        b = int(axis + 1 + side_axis)
+        if b > 2:
+            b -= 3
+        bounds = shaft_bounds(
+            s_lo[axis], s_hi[axis], t_lo[axis], t_hi[axis], lo[axis], s_lo[b], s_hi[b], t_lo[b], t_hi[b]
+        )
+        out[2 * side_axis] = side_share(point[b], lo[b], wp.min(bounds[0], point[b]))
+        out[2 * side_axis + 1] = side_share(point[b], hi[b], wp.max(bounds[1], point[b]))
+    return out
+
+
+@wp.func
+def strength(share: wp.vec4d) -> f64:
+    """Rank of a blocker: sides wholly covered first, then how much of the others."""
+    total = f64(0.0)
+    for c in range(4):
+        total += share[c]
+        if share[c] >= f64(1.0):
+            total += f64(4.0)
+    return total
+
+
+@wp.func
+def side_order(share: wp.vec4d) -> int:
+    """The four sides, least covered first, two bits each."""
+    order = int(0)
+    for place in range(4):
+        best = f64(3.0)
+        pick = int(0)
+        for c in range(4):
+            used = bool(False)
+            for earlier in range(place):
+                if ((order >> (2 * earlier)) & 3) == c:
+                    used = True
+            if not used and share[c] < best:
+                best = share[c]
+                pick = c
+        order = order | (pick << (2 * place))
+    return order
+
+
+@wp.func
+def scan(
+    tree: BlockerTree,
+    w: wp.vec3d,
+    xi: wp.vec3d,
+    octant: int,
+    s_lo: wp.vec3d,
+    s_hi: wp.vec3d,
+    t_lo: wp.vec3d,
+    t_hi: wp.vec3d,
+    strict: int,
+) -> wp.vec2i:
+    """The strongest blocker that the line crosses between leaving s and entering t, and the order of its sides.
+
+    Exact for integer w: every crossing time is an integer multiple of 1/4. Touching a blocker's edge counts as crossing.
+    Returns (-1, 0) if the line is clear.
+    """
+    leave = wp.min(w[0] * s_hi[0] - xi[0], wp.min(w[1] * s_hi[1] - xi[1], w[2] * s_hi[2] - xi[2]))
+    enter = wp.max(w[0] * t_lo[0] - xi[0], wp.max(w[1] * t_lo[1] - xi[1], w[2] * t_lo[2] - xi[2]))
+    best = wp.vec2i(-1, 0)
+    best_strength = f64(-1.0)
+    node = int(0)
+    count = tree.links.shape[0]
+    while node < count:
+        link = tree.links[node]
+        lo = reflect_low(tree.node_lo[node], tree.node_hi[node], octant)
+        hi = reflect_high(tree.node_lo[node], tree.node_hi[node], octant)
+        first = wp.max(w[0] * lo[0] - xi[0], wp.max(w[1] * lo[1] - xi[1], w[2] * lo[2] - xi[2]))
+        last = wp.min(w[0] * hi[0] - xi[0], wp.min(w[1] * hi[1] - xi[1], w[2] * hi[2] - xi[2]))
+        if first <= last and first <= enter and last >= leave and (strict == 0 or first < enter):
+            if link[1] >= 0:
+                axis = tree.axis[link[1]]
+                time = w[axis] * lo[axis] - xi[axis]
+                # A flat box that a line with no zero component meets is crossed at one time, and first == last == time.
+                if time >= leave:
+                    point = wp.vec3d((time + xi[0]) / w[0], (time + xi[1]) / w[1], (time + xi[2]) / w[2])
+                    share = shares(lo, hi, axis, point, s_lo, s_hi, t_lo, t_hi)
+                    value = strength(share)
+                    if value > best_strength:
+                        best_strength = value
+                        best = wp.vec2i(link[1], side_order(share))
+                        if value >= f64(20.0):
+                            return best
+            node += 1
+        else:
+            node = link[0]
+    return best
+
+
+@wp.func
+def append_side(
+    work: wp.array(dtype=f64), lists: int, counts: vec6i, lo: wp.vec3d, hi: wp.vec3d, axis: int, side: int, inside: bool
+) -> vec6i:
+    """The row "passes the blocker's plane beyond this side", or with `inside` short of it."""
+    b = int(axis + 1 + side // 2)
+    if b > 2:
+        b -= 3
+    edge = lo[b]
+    below = bool(True)
+    if side % 2 == 1:
+        edge = hi[b]
+        below = False
+    if inside:
+        below = not below
+    # Below: the plane is crossed before the edge, T_axis(plane) < T_b(edge), so xi_axis - xi_b >= w_axis plane - w_b edge.
+    i = int(axis)
+    j = int(b)
+    first = lo[axis]
+    second = edge
+    if not below:
+        i = b
+        j = axis
+        first = edge
+        second = lo[axis]
+    p = int(0)
+    if i + j == 3:
+        p = 2
+    if i + j == 2:
+        p = 4
+    if i > j:
+        p += 1
+    append_entry(work, lists, p, counts[p], first, second)
+    out = counts
+    out[p] = out[p] + 1
+    return out
+
+
+@wp.kernel
+def _search(
+    tree: BlockerTree,
+    pairs: Pairs,
+    first: int,
+    last: int,
+    cap: int,
+    work: wp.array(dtype=f64),
+    frames: wp.array(dtype=int),
+    answers: Answers,
+):
+    slot = wp.tid()
+    levels = slot * SLOT_SIZE
+    lists = levels + (MAX_BRANCHES + 2) * LEVEL_SIZE
+    spare = lists + LISTS_SIZE
+    stack = slot * (MAX_BRANCHES + 2) * FRAME
+    slots = work.shape[0] // SLOT_SIZE
+    row = first + slot
+    while row < last:
+        pair = pairs.rows[row]
+        verdict = int(HIDDEN)
+        nodes = int(0)
+        octant = int(0)
+        while octant < 8:
+            if possible_octant(
+                pairs.lo[pair[0]], pairs.hi[pair[0]], pairs.lo[pair[1]], pairs.hi[pair[1]], octant
+            ):
+                s_lo = reflect_low(pairs.lo[pair[0]], pairs.hi[pair[0]], octant)
+                s_hi = reflect_high(pairs.lo[pair[0]], pairs.hi[pair[0]], octant)
+                t_lo = reflect_low(pairs.lo[pair[1]], pairs.hi[pair[1]], octant)
+                t_hi = reflect_high(pairs.lo[pair[1]], pairs.hi[pair[1]], octant)
+                counts = append_box(work, lists, vec6i(), s_lo, s_hi, -1)
+                counts = append_box(work, lists, counts, t_lo, t_hi, -1)
+                start_level(work, levels)
+                answer = decide(work, lists, levels, levels + LEVEL_SIZE, spare, vec6i(), counts)
+                depth = int(0)
+                fresh = bool(True)
+                if answer == UNDECIDED:
+                    verdict = UNDECIDED
+                if answer != STABBED:
+                    depth = -1
+                for p in range(6):
+                    frames[stack + 3 + p] = counts[p]
+                while depth >= 0:
+                    at = stack + depth * FRAME
+                    level = levels + (depth + 1) * LEVEL_SIZE
+                    w = wp.vec3d(work[level + AT_W], work[level + AT_W + 1], work[level + AT_W + 2])
+                    if fresh:
+                        nodes += 1
+                        m = vec6d()
+                        for p in range(6):
+                            m[p] = work[level + AT_M + p]
+                        xi = offsets(m)
+                        hit = scan(tree, w, xi, octant, s_lo, s_hi, t_lo, t_hi, pair[2])
+                        frames[at] = hit[0]
+                        frames[at + 1] = 0
+                        frames[at + 2] = hit[1]
+                        fresh = False
+                        if hit[0] < 0:
+                            depth = -1
+                            # An unrounded direction makes crossing times inexact: kept, but not called a witness.
+                            if w[0] == wp.floor(w[0]):
+                                verdict = STABBED
+                                answers.octant[row] = octant
+                                answers.line[row] = w
+                                answers.offset[row] = xi
+                                octant = 8
+                            else:
+                                verdict = UNDECIDED
+                        elif nodes >= cap or depth == MAX_BRANCHES:
+                            verdict = UNDECIDED
+                            depth = -1
+                            octant = 8
+                    elif frames[at + 1] == 4:
+                        depth -= 1
+                    else:
+                        cursor = frames[at + 1]
+                        frames[at + 1] = cursor + 1
+                        blocker = frames[at]
+                        lo = reflect_low(tree.lo[blocker], tree.hi[blocker], octant)
+                        hi = reflect_high(tree.lo[blocker], tree.hi[blocker], octant)
+                        axis = tree.axis[blocker]
+                        for p in range(6):
+                            counts[p] = frames[at + 3 + p]
+                        grown = counts
+                        full = bool(False)
+                        for p in range(6):
+                            if counts[p] + 4 > LIST_CAPACITY:
+                                full = True
+                        if full:
+                            verdict = UNDECIDED
+                            depth = -1
+                            octant = 8
+                        else:
+                            for earlier in range(cursor + 1):
+                                side = (frames[at + 2] >> (2 * earlier)) & 3
+                                grown = append_side(work, lists, grown, lo, hi, axis, side, earlier < cursor)
+                            answer = decide(work, lists, level, level + LEVEL_SIZE, spare, counts, grown)
+                            if answer == UNDECIDED:
+                                verdict = UNDECIDED
+                            if answer == STABBED:
+                                depth += 1
+                                for p in range(6):
+                                    frames[at + FRAME + 3 + p] = grown[p]
+                                fresh = True
+            octant += 1
+        answers.verdict[row] = wp.uint8(verdict)
+        answers.nodes[row] = nodes
+        row += slots
