@@ -1,1 +1,74 @@
-"""Model readers: IFC and meshes."""
+"""Model readers: IFC, meshes and scene folders, chosen by the path."""
+
+import hashlib
+from pathlib import Path
+
+from ..errors import InputError
+from ..scene import GRID_M, Scene, source_path
+from .assemble import Model
+from .roles import check_doors
+
+IFC_SUFFIXES = (".ifc",)
+MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
+UP_CHOICES = (None, "y", "z")
+
+
+def read(
+    path: str | Path,
+    *,
+    up: str | None = None,
+    unit: str | float | None = None,
+    doors: str = "open",
+    grid_m: float = GRID_M,
+) -> Scene:
+    """The model in a file or scene folder, as a scene ready to bake.
+
+    Args:
+        path: .ifc, .glb, .gltf, .obj, .ply, .stl, or a folder written by `write_scene`.
+        up: axis that points up in a mesh file, "y" or "z"; by default y for glTF, which says so, and z for the others.
+        unit: unit of a mesh file's numbers: a name such as "millimetre", or metres as a number; by default the metre.
+        doors: "open" (sight passes every door) or "closed" (doors occlude; glazing never does).
+        grid_m: grid step [m].
+
+    Raises:
+        InputError: the file is missing, of no known type, unreadable, empty, or too large for the grid; or `up`,
+            `unit`, `doors` or `grid_m` do not fit it.
+    """
+    path = source_path(path)
+    check_doors(doors)
+    if up not in UP_CHOICES:
+        raise InputError(f"up: expected y or z, found {up!r}")
+    if not 0.0 < grid_m < float("inf"):
+        raise InputError(f"grid step: expected a positive length in metres, found {grid_m!r}")
+    if path.is_dir():
+        return _read_folder(path, grid_m)
+    suffix = path.suffix.lower()
+    if suffix not in IFC_SUFFIXES + MESH_SUFFIXES:
+        raise InputError(f"{path}: expected {', '.join(IFC_SUFFIXES + MESH_SUFFIXES)} or a folder, found {suffix!r}")
+    model = Model(source=str(path), sha256=_sha256(path), unit="metre", grid_m=grid_m)
+    if suffix in IFC_SUFFIXES:
+        if up == "y" or unit is not None:
+            raise InputError(f"{path}: expected no up or unit for IFC, which states its own, found {up or unit}")
+        from .ifc import read_ifc
+
+        return read_ifc(path, model, doors)
+    from .mesh import read_mesh
+
+    return read_mesh(path, model, up=up, unit=unit, doors=doors)
+
+
+def _read_folder(path: Path, grid_m: float) -> Scene:
+    from ..scene_folder import read_scene
+
+    scene = read_scene(path)
+    if grid_m not in (GRID_M, scene.grid_m):
+        raise InputError(f"{path}: expected its own grid step {scene.grid_m:g} m, found {grid_m:g} m")
+    return scene
+
+
+def _sha256(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: expected a readable file, found {error.strerror}") from None

@@ -1,0 +1,159 @@
+"""The last step of every reader: parts in metres, Z up, become a `Scene`."""
+
+from collections import Counter
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError
+from ..scene import Definition, Instance, Mesh, Role, Scene, Space, degenerate, snap
+
+MAX_COORDINATE_M = 1.0e9
+
+
+@dataclass(frozen=True)
+class Part:
+    """One object as read.
+
+    Attributes:
+        shape: equal for parts that share vertices and faces.
+        vertices: [m], in the shape's own frame, shape (n, 3), float64.
+        faces: shape (m, 3), int.
+        transform: shape's frame to the model's, metres, Z up, shape (4, 4), float64.
+    """
+
+    name: str
+    kind: str
+    role: Role
+    shape: Hashable
+    vertices: np.ndarray
+    faces: np.ndarray
+    transform: np.ndarray
+
+    def placed(self) -> np.ndarray:
+        """Vertices in the model's frame [m]."""
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused for its size
+            return self.vertices @ self.transform[:3, :3].T + self.transform[:3, 3]
+
+
+@dataclass
+class Model:
+    """What a reader found, in the file's own frame, metres, Z up.
+
+    Attributes:
+        openings: boxes [m], each of shape (2, 3).
+        skipped: as in `Scene`.
+    """
+
+    source: str
+    sha256: str
+    unit: str
+    grid_m: float
+    parts: list[Part] = field(default_factory=list)
+    spaces: list[Space] = field(default_factory=list)
+    openings: list[np.ndarray] = field(default_factory=list)
+    skipped: list[dict[str, str]] = field(default_factory=list)
+
+    def skip(self, what: str, why: str) -> None:
+        """Note a part that could not be read."""
+        self.skipped.append({"what": what, "why": why})
+
+
+def assemble(model: Model) -> Scene:
+    """The scene: moved to a whole-metre origin, welded, exact in float32, without empty parts.
+
+    Raises:
+        InputError: nothing opaque is left, or a part does not fit on the grid.
+    """
+    parts = [part for part in model.parts if _usable(part, model)]
+    _require_opaque(parts, model)
+    origin = _centre(parts, model)
+    definitions, objects = _share(parts, origin, model)
+    _require_opaque(objects, model)
+    boxes = [box - origin for box in model.openings if np.isfinite(box).all()]
+    return Scene(
+        definitions=definitions,
+        objects=objects,
+        spaces=[Space(space.name, space.vertices - origin, space.faces) for space in model.spaces],
+        openings=np.array(boxes).reshape(-1, 2, 3),
+        origin=origin,
+        grid_m=model.grid_m,
+        source=model.source,
+        sha256=model.sha256,
+        unit=model.unit,
+        skipped=model.skipped,
+    )
+
+
+def _centre(parts: list[Part], model: Model) -> np.ndarray:
+    """Whole metres nearest to the middle of the parts' common box."""
+    low = np.min([part.placed().min(axis=0) for part in parts], axis=0)
+    high = np.max([part.placed().max(axis=0) for part in parts], axis=0)
+    # Beyond this, float64 no longer resolves the grid and the sums below may overflow.
+    reach = np.abs([low, high]).max()
+    if reach > MAX_COORDINATE_M:
+        raise InputError(f"{model.source}: expected coordinates below {MAX_COORDINATE_M:g} m, found {reach:g} m")
+    return np.round((low + high) / 2) + 0.0  # -0.0 becomes 0.0
+
+
+def _usable(part: Part, model: Model) -> bool:
+    if not len(part.faces) or not len(part.vertices):
+        model.skip(part.name, f"{part.kind}: no triangles")
+        return False
+    if not (np.isfinite(part.vertices).all() and np.isfinite(part.transform).all()):
+        model.skip(part.name, f"{part.kind}: a coordinate is not finite")
+        return False
+    return True
+
+
+def _share(parts: list[Part], origin: np.ndarray, model: Model) -> tuple[list[Definition], list[Instance]]:
+    """Definitions for shapes, and instances of them; a shape used once is stored in place.
+
+    In place, walls that meet at a plane get the same float32 and the same grid plane, whatever frames they came in.
+    """
+    uses = Counter(part.shape for part in parts)
+    known: dict[Hashable, tuple[int, np.ndarray]] = {}
+    definitions: list[Definition] = []
+    objects: list[Instance] = []
+    dropped = 0
+    for part in parts:
+        flat = _flat_count(part, origin, model)
+        if flat == len(part.faces):
+            model.skip(part.name, f"{part.kind}: no area on the grid")
+            continue
+        dropped += flat
+        if uses[part.shape] == 1:
+            mesh, to_scene = float32_mesh(part.placed() - origin, part.faces), np.eye(4)
+            definitions.append(Definition(part.name, (mesh,)))
+            definition_id = len(definitions) - 1
+        else:
+            if part.shape not in known:
+                centre = np.round((part.vertices.min(axis=0) + part.vertices.max(axis=0)) / 2)
+                known[part.shape] = len(definitions), centre
+                definitions.append(Definition(part.name, (float32_mesh(part.vertices - centre, part.faces),)))
+            definition_id, centre = known[part.shape]
+            to_scene = part.transform.copy()
+            to_scene[:3, 3] += part.transform[:3, :3] @ centre - origin
+        objects.append(Instance(part.name, part.kind, definition_id, to_scene, part.role))
+    if dropped:
+        model.skip(f"{dropped} triangles", "no area on the grid")
+    return definitions, objects
+
+
+def _flat_count(part: Part, origin: np.ndarray, model: Model) -> int:
+    """How many of the part's triangles have no area on the grid."""
+    snapped = snap(part.placed() - origin, model.grid_m, f"{model.source}: {part.name!r}")
+    return int(degenerate(snapped[part.faces]).sum())
+
+
+def float32_mesh(vertices: np.ndarray, faces: np.ndarray, error_m: float = 0.0) -> Mesh:
+    """A mesh of welded vertices that float32 holds exactly, so that writing and reading it moves nothing."""
+    rounded, index = np.unique(np.asarray(vertices).astype(np.float32), axis=0, return_inverse=True)
+    return Mesh(rounded.astype(np.float64), index.reshape(-1)[np.asarray(faces)].astype(np.int32), error_m)
+
+
+def _require_opaque(parts: list[Part] | list[Instance], model: Model) -> None:
+    if all(part.role is Role.TRANSPARENT for part in parts):
+        lost = f"; {len(model.skipped)} skipped, first: {model.skipped[0]['why']}" if model.skipped else ""
+        raise InputError(f"{model.source}: expected something opaque, found {len(parts)} transparent objects{lost}")
