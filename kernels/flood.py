@@ -10,17 +10,14 @@ import warp as wp
 from .graph import DeviceGraph, reflect_high, reflect_low
 from .stab import (
     AT_M,
-    AT_POLYGON,
     AT_W,
     HIDDEN,
     LEVEL_SIZE,
     LIST_CAPACITY,
     LISTS_SIZE,
-    POLYGON_SIZE,
     STABBED,
     UNDECIDED,
     append_box,
-    copy_polygon,
     decide,
     offsets,
     raise_maxima,
@@ -108,8 +105,8 @@ def _flood(
         frames[stack + 1] = graph.starts[source]
         frames[stack + 2] = 0
         store_counts(frames, stack, counts)
-        depth = int(0)
-        tests = int(0)
+        depth = 0
+        tests = 0
         while depth >= 0:
             at = stack + depth * FRAME
             cell = frames[at]

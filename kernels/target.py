@@ -117,7 +117,14 @@ def shaft_bounds(v0: f64, v1: f64, x0: f64, x1: f64, k: f64, vlo: f64, vhi: f64,
 
 @wp.func
 def shares(
-    lo: wp.vec3d, hi: wp.vec3d, axis: int, point: wp.vec3d, s_lo: wp.vec3d, s_hi: wp.vec3d, t_lo: wp.vec3d, t_hi: wp.vec3d
+    lo: wp.vec3d,
+    hi: wp.vec3d,
+    axis: int,
+    point: wp.vec3d,
+    s_lo: wp.vec3d,
+    s_hi: wp.vec3d,
+    t_lo: wp.vec3d,
+    t_hi: wp.vec3d,
 ) -> wp.vec4d:
     """Share of the shaft that a blocker covers towards its sides (u low, u high, v low, v high)."""
     out = wp.vec4d()
@@ -147,12 +154,12 @@ def strength(share: wp.vec4d) -> f64:
 @wp.func
 def side_order(share: wp.vec4d) -> int:
     """The four sides, least covered first, two bits each."""
-    order = int(0)
+    order = 0
     for place in range(4):
         best = f64(3.0)
-        pick = int(0)
+        pick = 0
         for c in range(4):
-            used = bool(False)
+            used = False
             for earlier in range(place):
                 if ((order >> (2 * earlier)) & 3) == c:
                     used = True
@@ -184,7 +191,7 @@ def scan(
     enter = wp.max(w[0] * t_lo[0] - xi[0], wp.max(w[1] * t_lo[1] - xi[1], w[2] * t_lo[2] - xi[2]))
     best = wp.vec2i(-1, 0)
     best_strength = f64(-1.0)
-    node = int(0)
+    node = 0
     count = tree.links.shape[0]
     while node < count:
         link = tree.links[node]
@@ -221,7 +228,7 @@ def append_side(
     if b > 2:
         b -= 3
     edge = lo[b]
-    below = bool(True)
+    below = True
     if side % 2 == 1:
         edge = hi[b]
         below = False
@@ -237,7 +244,7 @@ def append_side(
         j = axis
         first = edge
         second = lo[axis]
-    p = int(0)
+    p = 0
     if i + j == 3:
         p = 2
     if i + j == 2:
@@ -271,12 +278,10 @@ def _search(
     while row < last:
         pair = pairs.rows[row]
         verdict = int(HIDDEN)
-        nodes = int(0)
-        octant = int(0)
+        nodes = 0
+        octant = 0
         while octant < 8:
-            if possible_octant(
-                pairs.lo[pair[0]], pairs.hi[pair[0]], pairs.lo[pair[1]], pairs.hi[pair[1]], octant
-            ):
+            if possible_octant(pairs.lo[pair[0]], pairs.hi[pair[0]], pairs.lo[pair[1]], pairs.hi[pair[1]], octant):
                 s_lo = reflect_low(pairs.lo[pair[0]], pairs.hi[pair[0]], octant)
                 s_hi = reflect_high(pairs.lo[pair[0]], pairs.hi[pair[0]], octant)
                 t_lo = reflect_low(pairs.lo[pair[1]], pairs.hi[pair[1]], octant)
@@ -285,8 +290,8 @@ def _search(
                 counts = append_box(work, lists, counts, t_lo, t_hi, -1)
                 start_level(work, levels)
                 answer = decide(work, lists, levels, levels + LEVEL_SIZE, spare, vec6i(), counts)
-                depth = int(0)
-                fresh = bool(True)
+                depth = 0
+                fresh = True
                 if answer == UNDECIDED:
                     verdict = UNDECIDED
                 if answer != STABBED:
@@ -335,7 +340,7 @@ def _search(
                         for p in range(6):
                             counts[p] = frames[at + 3 + p]
                         grown = counts
-                        full = bool(False)
+                        full = False
                         for p in range(6):
                             if counts[p] + 4 > LIST_CAPACITY:
                                 full = True

@@ -1,0 +1,142 @@
+"""Spatial subdivision: boxes cut along the major opaque faces, merged where nothing separates them.
+
+Source: Funkhouser et al. 1996, section 3.1 (k-D cells along axis-aligned opaque surfaces).
+"""
+
+import heapq
+
+import numpy as np
+
+from .graph import OTHER_AXES
+from .opaque import OpaquePlanes
+
+
+def subdivide(opaque: OpaquePlanes, low: np.ndarray, high: np.ndarray, threshold: float = 0.0) -> np.ndarray:
+    """k-D leaves: at each node the plane whose opaque area is the largest share of the node's cross-section.
+
+    Args:
+        opaque: opaque rectangles.
+        low: corner of the box to cut [grid steps], int64 x 3.
+        high: the other corner.
+        threshold: opaque area [squared grid steps] below which a plane does not cut. Larger is faster and looser.
+
+    Returns:
+        Disjoint boxes that tile the given one, shape (n, 2, 3), int32.
+    """
+    leaves = []
+    todo = [(np.stack([low, high]).astype(np.int64), [boxes.astype(np.int64) for boxes in opaque.boxes])]
+    while todo:
+        box, inside = todo.pop()
+        clipped, best = [], (0.0, -1, 0)
+        for axis in range(3):
+            rectangles = _clip(inside[axis], box, axis)
+            clipped.append(rectangles)
+            if len(rectangles):
+                share, plane = _best_plane(rectangles, box, axis, threshold)
+                best = max(best, (share, axis, plane))
+        if best[1] < 0:
+            leaves.append(box)
+            continue
+        _, axis, plane = best
+        lower, upper = box.copy(), box.copy()
+        lower[1, axis] = upper[0, axis] = plane
+        todo += [(upper, clipped), (lower, clipped)]
+    return np.array(leaves, np.int32)
+
+
+def _clip(rectangles: np.ndarray, box: np.ndarray, axis: int) -> np.ndarray:
+    """Parts of flat boxes that lie strictly inside a box on their axis, with positive area."""
+    k = rectangles[:, 0, axis]
+    rectangles = rectangles[(k > box[0, axis]) & (k < box[1, axis])]
+    low, high = np.maximum(rectangles[:, 0], box[0]), np.minimum(rectangles[:, 1], box[1])
+    keep = (high - low)[:, OTHER_AXES[axis]].min(axis=1) > 0 if len(rectangles) else np.zeros(0, bool)
+    return np.stack([low[keep], high[keep]], axis=1)
+
+
+def _best_plane(rectangles: np.ndarray, box: np.ndarray, axis: int, threshold: float) -> tuple[float, int]:
+    """Largest opaque share of the cross-section and its plane; share 0 if none passes the threshold."""
+    u, v = OTHER_AXES[axis]
+    sides = (rectangles[:, 1] - rectangles[:, 0]).astype(float)
+    planes, where = np.unique(rectangles[:, 0, axis], return_inverse=True)
+    area = np.bincount(where, sides[:, u] * sides[:, v])
+    area[area <= threshold] = 0.0
+    pick = int(area.argmax())
+    size = (box[1] - box[0]).astype(float)
+    return float(area[pick] / (size[u] * size[v])), int(planes[pick])
+
+
+def merge(leaves: np.ndarray, opaque: OpaquePlanes) -> np.ndarray:
+    """Merge neighbours that share one identical, wholly open face, largest faces first.
+
+    Args:
+        leaves: disjoint boxes, shape (n, 2, 3), int32.
+        opaque: opaque rectangles.
+
+    Returns:
+        Boxes with the same union, shape (m, 2, 3), int32.
+    """
+    planes = PlaneIndex(opaque)
+    boxes = [tuple(box) for box in leaves.reshape(-1, 6).tolist()]
+    alive = [True] * len(boxes)
+    faces: dict[tuple[int, ...], int] = {}
+    heap: list[tuple[int, int, int, int]] = []
+
+    def face(box: tuple[int, ...], axis: int, side: int) -> tuple[int, ...]:
+        u, v = OTHER_AXES[axis]
+        return (axis, side, box[axis + 3 * side], box[u], box[u + 3], box[v], box[v + 3])
+
+    def offer(index: int) -> None:
+        box = boxes[index]
+        for axis in range(3):
+            for side in (0, 1):
+                key = face(box, axis, side)
+                other = faces.get((axis, 1 - side, *key[2:]), -1)
+                if other >= 0:
+                    area = (key[4] - key[3]) * (key[6] - key[5])
+                    low, high = (index, other) if side else (other, index)
+                    heapq.heappush(heap, (-area, low, high, axis))
+                faces[key] = index
+
+    def forget(index: int) -> None:
+        alive[index] = False
+        for axis in range(3):
+            for side in (0, 1):
+                faces.pop(face(boxes[index], axis, side), None)
+
+    for index in range(len(boxes)):
+        offer(index)
+    while heap:
+        _, low, high, axis = heapq.heappop(heap)
+        if alive[low] and alive[high] and planes.is_open(face(boxes[low], axis, 1)):
+            forget(low)
+            forget(high)
+            joined = list(boxes[low])
+            joined[axis + 3] = boxes[high][axis + 3]
+            boxes.append(tuple(joined))
+            alive.append(True)
+            offer(len(boxes) - 1)
+    return np.array([box for box, keep in zip(boxes, alive, strict=True) if keep], np.int32).reshape(-1, 2, 3)
+
+
+class PlaneIndex:
+    """Opaque rectangles of each plane, looked up by axis and coordinate."""
+
+    def __init__(self, opaque: OpaquePlanes) -> None:
+        self._planes: dict[tuple[int, int], np.ndarray] = {}
+        for axis, boxes in enumerate(opaque.boxes):
+            planes, starts = np.unique(boxes[:, 0, axis], return_index=True)
+            for k, part in zip(planes, np.split(boxes, starts[1:]), strict=True):
+                self._planes[axis, int(k)] = part[:, :, OTHER_AXES[axis]].astype(np.int64)
+
+    def rectangles(self, axis: int, k: int) -> np.ndarray:
+        """Opaque rectangles of a plane, shape (n, 2, 2), int64."""
+        return self._planes.get((axis, k), np.zeros((0, 2, 2), np.int64))
+
+    def is_open(self, face: tuple[int, ...]) -> bool:
+        """Whether nothing opaque overlaps the face (axis, side, plane, u low, u high, v low, v high)."""
+        axis, _, k, u0, u1, v0, v1 = face
+        r = self._planes.get((axis, k))
+        if r is None:
+            return True
+        hit = (r[:, 0, 0] < u1) & (r[:, 1, 0] > u0) & (r[:, 0, 1] < v1) & (r[:, 1, 1] > v0)
+        return not hit.any()
