@@ -105,8 +105,8 @@ def _flood(
         frames[stack + 1] = graph.starts[source]
         frames[stack + 2] = 0
         store_counts(frames, stack, counts)
-        depth = 0
-        tests = 0
+        depth = int(0)
+        tests = int(0)
         while depth >= 0:
             at = stack + depth * FRAME
             cell = frames[at]

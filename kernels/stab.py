@@ -167,9 +167,9 @@ def clip(work: wp.array(dtype=f64), source: int, target: int, g: wp.vec3d, tag: 
         3 if the polygon has no room for another edge (target untouched).
     """
     n = int(work[source])
-    removed = 0
-    positive = 0
-    negative = 0
+    removed = int(0)
+    positive = int(0)
+    negative = int(0)
     e = edge_cut(work, source, 0)
     for k in range(n):
         following = int(k + 1)
@@ -189,7 +189,7 @@ def clip(work: wp.array(dtype=f64), source: int, target: int, g: wp.vec3d, tag: 
     if positive == 0:
         return 2
     # Vertex k lies between edges k and k + 1. The run of removed vertices starts at `first` and ends before `kept`.
-    first = 0
+    first = int(0)
     for k in range(n):
         before = int(k - 1)
         if before < 0:
@@ -285,7 +285,7 @@ def narrow_slopes(work: wp.array(dtype=f64), lists: int, level: int, before: vec
     Returns:
         HIDDEN as soon as some pair of axes has no open slope interval, else a bit mask of the bounds that moved times 4.
     """
-    moved = 0
+    moved = int(0)
     for u in range(3):
         at = level + 6 * u
         ln = work[at]
@@ -299,7 +299,7 @@ def narrow_slopes(work: wp.array(dtype=f64), lists: int, level: int, before: vec
         for k in range(counts[2 * u]):
             a = work[front + 2 * k]
             b = work[front + 2 * k + 1]
-            m = 0
+            m = int(0)
             if k < before[2 * u]:
                 m = before[2 * u + 1]
             while m < counts[2 * u + 1]:
@@ -348,7 +348,7 @@ def maxima(work: wp.array(dtype=f64), lists: int, counts: vec6i, w: wp.vec3d) ->
         i = list_from(p)
         j = list_to(p)
         best = f64(-1.0e300)
-        best_at = 0
+        best_at = int(0)
         for k in range(counts[p]):
             at = lists + (p * LIST_CAPACITY + k) * 2
             forward = w[i] * work[at]
@@ -367,7 +367,7 @@ def maxima(work: wp.array(dtype=f64), lists: int, counts: vec6i, w: wp.vec3d) ->
 def cycle_cut(work: wp.array(dtype=f64), lists: int, m: vec6d, arg: vec6i) -> wp.vec4d:
     """The worst cycle at the trial direction as a cut (x, y, z) with its tag."""
     best = m[0] + m[1]
-    cycle = 0
+    cycle = int(0)
     for u in range(1, 3):
         value = m[2 * u] + m[2 * u + 1]
         if value > best:
@@ -380,7 +380,7 @@ def cycle_cut(work: wp.array(dtype=f64), lists: int, m: vec6d, arg: vec6i) -> wp
         cycle = 4
     p0 = int(2 * cycle)
     p1 = int(2 * cycle + 1)
-    p2 = -1
+    p2 = int(-1)
     if cycle == 3:
         p0 = 0
         p1 = 2
@@ -471,7 +471,7 @@ def decide(
     verdict = UNDECIDED
     m = vec6d()
     w = wp.vec3d()
-    trial = 0
+    trial = int(0)
     while trial < MAX_TRIALS:
         trial += 1
         real = middle(work, current)

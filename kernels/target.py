@@ -154,12 +154,12 @@ def strength(share: wp.vec4d) -> f64:
 @wp.func
 def side_order(share: wp.vec4d) -> int:
     """The four sides, least covered first, two bits each."""
-    order = 0
+    order = int(0)
     for place in range(4):
         best = f64(3.0)
-        pick = 0
+        pick = int(0)
         for c in range(4):
-            used = False
+            used = bool(False)
             for earlier in range(place):
                 if ((order >> (2 * earlier)) & 3) == c:
                     used = True
@@ -191,7 +191,7 @@ def scan(
     enter = wp.max(w[0] * t_lo[0] - xi[0], wp.max(w[1] * t_lo[1] - xi[1], w[2] * t_lo[2] - xi[2]))
     best = wp.vec2i(-1, 0)
     best_strength = f64(-1.0)
-    node = 0
+    node = int(0)
     count = tree.links.shape[0]
     while node < count:
         link = tree.links[node]
@@ -228,7 +228,7 @@ def append_side(
     if b > 2:
         b -= 3
     edge = lo[b]
-    below = True
+    below = bool(True)
     if side % 2 == 1:
         edge = hi[b]
         below = False
@@ -244,7 +244,7 @@ def append_side(
         j = axis
         first = edge
         second = lo[axis]
-    p = 0
+    p = int(0)
     if i + j == 3:
         p = 2
     if i + j == 2:
@@ -278,8 +278,8 @@ def _search(
     while row < last:
         pair = pairs.rows[row]
         verdict = int(HIDDEN)
-        nodes = 0
-        octant = 0
+        nodes = int(0)
+        octant = int(0)
         while octant < 8:
             if possible_octant(pairs.lo[pair[0]], pairs.hi[pair[0]], pairs.lo[pair[1]], pairs.hi[pair[1]], octant):
                 s_lo = reflect_low(pairs.lo[pair[0]], pairs.hi[pair[0]], octant)
@@ -290,8 +290,8 @@ def _search(
                 counts = append_box(work, lists, counts, t_lo, t_hi, -1)
                 start_level(work, levels)
                 answer = decide(work, lists, levels, levels + LEVEL_SIZE, spare, vec6i(), counts)
-                depth = 0
-                fresh = True
+                depth = int(0)
+                fresh = bool(True)
                 if answer == UNDECIDED:
                     verdict = UNDECIDED
                 if answer != STABBED:
@@ -340,7 +340,7 @@ def _search(
                         for p in range(6):
                             counts[p] = frames[at + 3 + p]
                         grown = counts
-                        full = False
+                        full = bool(False)
                         for p in range(6):
                             if counts[p] + 4 > LIST_CAPACITY:
                                 full = True
