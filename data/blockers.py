@@ -1,9 +1,9 @@
 """Blockers: large flat rectangles that no sightline between live cells can cross.
 
 On the plane x_i = k a sightline that stays in live cells can pass only through the open cross-section of a cell or
-through a portal on the plane. Everything else is blocked: opaque faces, the inside of solids, dead cells. Merging all of
-it on one plane before cutting it into *maximal, overlapping* rectangles is what makes single blockers strong: a wall's
-face has a gap where another wall joins it, the blocked region has none.
+through a portal on the plane. Everything else is blocked: opaque faces, the inside of solids, dead cells. Merging all
+of it on one plane before cutting it into *maximal, overlapping* rectangles is what makes single blockers strong: a
+wall's face has a gap where another wall joins it, the blocked region has none.
 """
 
 from dataclasses import dataclass
@@ -11,23 +11,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from .graph import OTHER_AXES, CellGraph
+from .hierarchy import Hierarchy, build_hierarchy
 
 
 @dataclass
 class Blockers:
-    """Rectangles that block, and a bounding volume hierarchy over them in depth-first order.
+    """Rectangles that block.
 
     Attributes:
-        boxes: flat boxes [grid steps], shape (blockers, 2, 3), int32, in the order of the leaves.
+        boxes: flat boxes [grid steps], shape (blockers, 2, 3), int32.
         axis: the axis each is perpendicular to, shape (blockers,), int32.
-        node_boxes: shape (nodes, 2, 3), int32.
-        node_links: shape (nodes, 2), int32: (node to go to when this one is missed or done, blocker of a leaf or -1).
+        hierarchy: over the boxes.
     """
 
     boxes: np.ndarray
     axis: np.ndarray
-    node_boxes: np.ndarray
-    node_links: np.ndarray
+    hierarchy: Hierarchy
 
 
 def find_blockers(graph: CellGraph) -> Blockers:
@@ -49,9 +48,8 @@ def find_blockers(graph: CellGraph) -> Blockers:
                 pieces.append(boxes)
                 axes.append(np.full(len(boxes), axis, np.int32))
     boxes = np.concatenate(pieces) if pieces else np.zeros((0, 2, 3), np.int32)
-    order, node_boxes, node_links = build_hierarchy(boxes)
     axis_of = np.concatenate(axes) if axes else np.zeros(0, np.int32)
-    return Blockers(boxes[order], axis_of[order], node_boxes, node_links)
+    return Blockers(boxes, axis_of, build_hierarchy(boxes))
 
 
 def _plane_blockers(graph: CellGraph, axis: int, k: int, near: np.ndarray) -> np.ndarray:
@@ -109,38 +107,3 @@ def _run(row: np.ndarray, i: int) -> tuple[int, int]:
     after = np.flatnonzero(~row[i:])
     before = np.flatnonzero(~row[:i])
     return (int(before[-1]) + 1 if len(before) else 0), (i + int(after[0]) if len(after) else len(row))
-
-
-def build_hierarchy(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Median-split hierarchy in depth-first order, walked without a stack.
-
-    Returns:
-        order of the boxes, shape (n,), and nodes as in `Blockers`; one box a leaf.
-    """
-    order: list[int] = []
-    node_boxes: list[np.ndarray] = []
-    links: list[list[int]] = []
-    centres = boxes.astype(np.int64).sum(axis=1)
-    # (members, None) opens a node; (None, node) closes it and sets where a miss goes.
-    todo: list[tuple[np.ndarray | None, int]] = [(np.arange(len(boxes)), -1)] if len(boxes) else []
-    while todo:
-        members, node = todo.pop()
-        if members is None:
-            links[node][0] = len(links)
-            continue
-        node = len(links)
-        node_boxes.append(np.stack([boxes[members, 0].min(axis=0), boxes[members, 1].max(axis=0)]))
-        links.append([-1, -1])
-        todo.append((None, node))
-        if len(members) == 1:
-            links[node][1] = len(order)
-            order.append(int(members[0]))
-        else:
-            axis = int(np.ptp(centres[members], axis=0).argmax())
-            members = members[np.argsort(centres[members, axis], kind="stable")]
-            todo += [(members[len(members) // 2 :], -1), (members[: len(members) // 2], -1)]
-    return (
-        np.array(order, np.int64),
-        np.array(node_boxes, np.int32).reshape(-1, 2, 3),
-        np.array(links, np.int32).reshape(-1, 2),
-    )

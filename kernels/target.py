@@ -10,9 +10,14 @@ The blocker is the one that covers most of the shaft between the two boxes, not 
 storeys ends the search at its root.
 """
 
+from dataclasses import dataclass
+
+import numpy as np
 import warp as wp
 
+from ..data.blockers import Blockers
 from .graph import reflect_high, reflect_low
+from .launch import SlotSizes, run_sliced, vectors
 from .stab import (
     AT_M,
     AT_W,
@@ -36,7 +41,11 @@ wp.set_module_options({"enable_backward": False})
 f64 = wp.float64
 
 MAX_BRANCHES = wp.constant(60)
-SLOT_SIZE = wp.constant((60 + 2) * (27 + 1 + 4 * 24) + 6 * 96 * 2 + 2 * (1 + 4 * 24) + 8)
+# Levels, rows, two spare polygons and the failing cut, and the rows again for widening the witness.
+SLOT_SIZE = wp.constant((60 + 2) * (27 + 1 + 4 * 24) + 2 * 6 * 96 * 2 + 2 * (1 + 4 * 24) + 8)
+SPARES_SIZE = wp.constant(2 * (1 + 4 * 24) + 8)
+# A witness is first tried with this clearance [grid steps] from every edge it passes, then with a quarter of it, ...
+WIDEST_CLEARANCE = wp.constant(wp.float64(1024.0))
 # Integers a level: blocker, cursor, order of the four sides, six row counts.
 FRAME = wp.constant(9)
 
@@ -257,6 +266,42 @@ def append_side(
     return out
 
 
+@wp.func
+def inset(lo: wp.vec3d, hi: wp.vec3d, clearance: f64) -> wp.vec3d:
+    """How far to shrink a box on each axis: the clearance, but never more than a quarter of the box."""
+    out = wp.vec3d()
+    for i in range(3):
+        out[i] = wp.floor(wp.min(clearance, f64(0.25) * (hi[i] - lo[i])))
+    return out
+
+
+@wp.func
+def widen(
+    work: wp.array(dtype=f64),
+    lists: int,
+    level: int,
+    spare: int,
+    counts: vec6i,
+    s_lo: wp.vec3d,
+    s_hi: wp.vec3d,
+    t_lo: wp.vec3d,
+    t_hi: wp.vec3d,
+    clearance: f64,
+) -> int:
+    """Decide the same rows again, each tightened by a clearance, into `level`; STABBED if a line keeps that clear."""
+    roomy = spare + SPARES_SIZE
+    s_in = inset(s_lo, s_hi, clearance)
+    t_in = inset(t_lo, t_hi, clearance)
+    done = append_box(work, roomy, vec6i(), s_lo + s_in, s_hi - s_in, -1)
+    done = append_box(work, roomy, done, t_lo + t_in, t_hi - t_in, -1)
+    for p in range(6):
+        for k in range(2, counts[p]):
+            at = lists + (p * LIST_CAPACITY + k) * 2
+            append_entry(work, roomy, p, k, work[at] + clearance, work[at + 1] - clearance)
+    start_level(work, level)
+    return decide(work, roomy, level, level + LEVEL_SIZE, spare, vec6i(), counts)
+
+
 @wp.kernel
 def _search(
     tree: BlockerTree,
@@ -318,6 +363,29 @@ def _search(
                             # An unrounded direction makes crossing times inexact: kept, but not called a witness.
                             if w[0] == wp.floor(w[0]):
                                 verdict = STABBED
+                                for p in range(6):
+                                    counts[p] = frames[at + 3 + p]
+                                clearance = WIDEST_CLEARANCE
+                                while clearance >= f64(1.0):
+                                    if (
+                                        widen(
+                                            work, lists, levels, spare, counts, s_lo, s_hi, t_lo, t_hi, clearance
+                                        )
+                                        == STABBED
+                                    ):
+                                        wide = levels + LEVEL_SIZE
+                                        for p in range(6):
+                                            m[p] = work[wide + AT_M + p]
+                                        w_wide = wp.vec3d(
+                                            work[wide + AT_W], work[wide + AT_W + 1], work[wide + AT_W + 2]
+                                        )
+                                        xi_wide = offsets(m)
+                                        hit = scan(tree, w_wide, xi_wide, octant, s_lo, s_hi, t_lo, t_hi, pair[2])
+                                        if hit[0] < 0:
+                                            w = w_wide
+                                            xi = xi_wide
+                                            clearance = f64(0.0)
+                                    clearance *= f64(0.25)
                                 answers.octant[row] = octant
                                 answers.line[row] = w
                                 answers.offset[row] = xi
@@ -364,3 +432,71 @@ def _search(
         answers.verdict[row] = wp.uint8(verdict)
         answers.nodes[row] = nodes
         row += slots
+
+
+@dataclass
+class TargetAnswers:
+    """Answers of a target search, one row a pair.
+
+    Attributes:
+        verdict: 0 hidden, 1 visible, 2 unknown; uint8.
+        nodes: lines tried, int32.
+        octant: of a visible pair's line, int32.
+        line: its w, float64, shape (n, 3): component i of the direction is sign_i / w_i.
+        offset: its xi: coordinate i at time t is sign_i (t + xi_i) / w_i.
+    """
+
+    verdict: np.ndarray
+    nodes: np.ndarray
+    octant: np.ndarray
+    line: np.ndarray
+    offset: np.ndarray
+
+
+def blocker_tree(blockers: Blockers, device: str = "cpu") -> BlockerTree:
+    """Copy blockers to a device."""
+    tree = BlockerTree()
+    tree.lo, tree.hi = vectors(blockers.boxes[:, 0], device), vectors(blockers.boxes[:, 1], device)
+    tree.axis = wp.array(blockers.axis, dtype=int, device=device)
+    nodes = blockers.hierarchy
+    tree.node_lo, tree.node_hi = vectors(nodes.boxes[:, 0], device), vectors(nodes.boxes[:, 1], device)
+    tree.links = wp.array(nodes.links, dtype=wp.vec2i, device=device)
+    return tree
+
+
+def launch_target_search(
+    tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, *, cap: int = 2000, threads: int = 1, device: str = "cpu"
+) -> TargetAnswers:
+    """Whether an open set of sightlines leads from box to box past every blocker.
+
+    Args:
+        tree: blockers on the same device.
+        boxes: [grid steps], shape (m, 2, 3), int32, |coordinate| <= 2**24.
+        rows: (source box, target box, strict), shape (n, 3), int. Source and target must not overlap. With strict 1 a
+            blocker that lies on the target's near face does not count (the target is a surface, not a cell).
+        cap: lines tried a pair before the answer is unknown.
+        threads: CPU threads; ignored on a GPU.
+        device: Warp device.
+
+    Returns:
+        Answers. Hidden is exact: no open set of lines passes. Visible is exact for the blockers given, and its line keeps
+        the widest clearance that was found (1024, 256, ... 1 grid steps, or whatever the first line had). Unknown is
+        neither: keep it.
+    """
+    count = len(rows)
+    work = Pairs()
+    work.lo, work.hi = vectors(boxes[:, 0], device), vectors(boxes[:, 1], device)
+    work.rows = vectors(rows, device)
+    answers = Answers()
+    answers.verdict = wp.zeros(count, dtype=wp.uint8, device=device)
+    answers.nodes = wp.zeros(count, dtype=int, device=device)
+    answers.octant = wp.zeros(count, dtype=int, device=device)
+    answers.line = wp.zeros(count, dtype=wp.vec3d, device=device)
+    answers.offset = wp.zeros(count, dtype=wp.vec3d, device=device)
+
+    def launch(first: int, last: int, slots: int, scratch: wp.array, frames: wp.array) -> None:
+        wp.launch(_search, dim=slots, inputs=[tree, work, first, last, cap, scratch, frames, answers], device=device)
+
+    scratch = SlotSizes(int(SLOT_SIZE), (int(MAX_BRANCHES) + 2) * int(FRAME))
+    run_sliced(launch, count, scratch, module=__name__, threads=threads, device=device)
+    return TargetAnswers(*(getattr(answers, name).numpy() for name in TargetAnswers.__dataclass_fields__))

@@ -1,0 +1,84 @@
+"""Launching kernels that loop over work items with a scratch slot each, on CPU threads or a GPU."""
+
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+# Items a CPU thread takes at a time: small enough to balance, large enough to hide the launch (about 50 us).
+CHUNK = 1024
+GPU_SLOTS = 8192
+
+
+@dataclass(frozen=True)
+class SlotSizes:
+    """Scratch that one slot needs: float64 values and integers."""
+
+    values: int
+    integers: int
+
+
+def thread_count(threads: int | None) -> int:
+    """The given number of threads, or one a core."""
+    # Cores this process may use, not those of the machine; not every system can tell.
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return threads or allowed or 1
+
+
+def vectors(rows: np.ndarray, device: str) -> wp.array:
+    """Rows of three integers as a Warp array of vec3i."""
+    return wp.array(np.ascontiguousarray(rows, np.int32).reshape(-1, 3), dtype=wp.vec3i, device=device)
+
+
+def run_sliced(
+    launch: Callable[[int, int, int, wp.array, wp.array], None],
+    count: int,
+    sizes: SlotSizes,
+    *,
+    module: str,
+    threads: int = 1,
+    device: str = "cpu",
+) -> None:
+    """Call `launch(first, last, slots, scratch, frames)` until all items are done.
+
+    On a GPU once, with many slots. On the CPU in chunks from `threads` threads, one slot each: Warp runs a CPU launch on
+    the calling thread and releases the GIL. Items may not depend on each other, so the result does not depend on this.
+    """
+    if count == 0:
+        return
+    wp.load_module(module, device=device)
+    if not wp.get_device(device).is_cpu:
+        slots = min(count, GPU_SLOTS)
+        launch(0, count, slots, *_scratch(sizes, slots, device))
+        wp.synchronize_device(device)
+        return
+    threads = max(1, min(threads, -(-count // CHUNK)))
+    starts = iter(range(0, count, CHUNK))
+    lock = threading.Lock()
+
+    def worker() -> None:
+        scratch = _scratch(sizes, 1, device)
+        while True:
+            with lock:
+                first = next(starts, None)
+            if first is None:
+                return
+            launch(first, min(first + CHUNK, count), 1, *scratch)
+
+    if threads == 1:
+        worker()
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        for done in [pool.submit(worker) for _ in range(threads)]:
+            done.result()
+
+
+def _scratch(sizes: SlotSizes, slots: int, device: str) -> tuple[wp.array, wp.array]:
+    return (
+        wp.zeros(sizes.values * slots, dtype=wp.float64, device=device),
+        wp.zeros(max(1, sizes.integers * slots), dtype=int, device=device),
+    )
