@@ -104,7 +104,7 @@ class Sightlines:
         """Sign of each point against its triangle's plane; 0 where float64 cannot tell."""
         normals = self._normals[ids]
         normals *= points - self._corners[ids, 0]
-        return _sure_sign(normals[:, 0] + normals[:, 1] + normals[:, 2], np.abs(normals).sum(axis=1))
+        return sure_sign(normals[:, 0] + normals[:, 1] + normals[:, 2], np.abs(normals).sum(axis=1))
 
     def _edge_turns(self, ids: np.ndarray, origins: np.ndarray, ends: np.ndarray) -> np.ndarray:
         """Signs of the lines against the triangles' three edges, shape (pairs, 3); 0 where float64 cannot tell."""
@@ -118,7 +118,7 @@ class Sightlines:
                 left, right = a[:, j] * b[:, k], a[:, k] * b[:, j]
                 value += along[:, i] * (left - right)
                 size += np.abs(along[:, i]) * (np.abs(left) + np.abs(right))
-            turns[:, edge] = _sure_sign(value, size)
+            turns[:, edge] = sure_sign(value, size)
         return turns
 
     @cached_property
@@ -181,7 +181,7 @@ class Sightlines:
             u, v = self._corners[ids, edge, :2], self._corners[ids, (edge + 1) % 3, :2]
             along, across = v - u, points[:, :2] - u
             left, right = along[:, 0] * across[:, 1], along[:, 1] * across[:, 0]
-            turns[:, edge] = _sure_sign(left - right, np.abs(left) + np.abs(right))
+            turns[:, edge] = sure_sign(left - right, np.abs(left) + np.abs(right))
         return turns
 
 
@@ -204,7 +204,7 @@ def closed_objects(triangles: np.ndarray, owners: np.ndarray) -> np.ndarray:
     return np.setdiff1d(owners, unmatched)
 
 
-def _sure_sign(value: np.ndarray, size: np.ndarray) -> np.ndarray:
+def sure_sign(value: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Sign of a determinant, 0 where its rounding error could change it; `size`: sum of its terms' magnitudes."""
     return np.where(np.abs(value) > BOUND * size + UNDERFLOW, np.sign(value), 0.0)
 

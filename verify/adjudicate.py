@@ -1,0 +1,135 @@
+"""Is a pair that the bake hides really visible? Exact judgement of candidate rays."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from ..data.graph import CellGraph
+from .exact import BLOCKED as THROUGH
+from .exact import crossing_time
+from .rays import Candidates
+from .sightline import Sight, Sightlines
+from .walk import Links, portal_path
+from .witness import Witnesses, passes_portals
+
+# How far past a float32 hit the exact crossing is sought: float32 hits are good to about 1e-6.
+OVERSHOOT = 1.0 + 1e-4
+
+
+class Judgement(IntEnum):
+    """What became of a candidate."""
+
+    BLOCKED = 0
+    GRAZE = 1
+    LEAK = 2
+    VISIBLE = 3
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Everything needed to decide whether a sightline is real.
+
+    Attributes:
+        graph: cells and portals.
+        lines: opaque triangles; None for a bare graph, where passing portals is what visible means.
+        glass: transparent triangles.
+        links: portal links of a bare graph.
+        seal_steps: cracks narrower than this are leaks [grid steps]; 0 for none.
+    """
+
+    graph: CellGraph
+    lines: Sightlines | None
+    glass: Sightlines
+    links: Links
+    seal_steps: float = 0.0
+
+    def judge(self, kind: str, cell: int, target: int, origin: np.ndarray, end: np.ndarray) -> Judgement:
+        """Whether the sightline shows the target from the cell.
+
+        Args:
+            kind: "cell" or "object".
+            cell: source cell_id.
+            target: cell_id or object_id.
+            origin: start [grid steps], 3 float64; anything but strictly inside the cell and outside every solid shows
+                nothing.
+            end: for a cell a point strictly inside it, for an object a point just behind its first surface.
+        """
+        low, high = self.graph.cells[cell]
+        if not ((origin > low) & (origin < high)).all():
+            return Judgement.BLOCKED
+        if self.lines is not None and not self.lines.outside_solids(origin[None])[0]:
+            return Judgement.BLOCKED
+        found = (
+            self._sees_object(target, origin, end) if kind == "object" else self._sees_cell(cell, target, origin, end)
+        )
+        if found is Judgement.VISIBLE and self.lines is not None and self._is_crack(origin, end):
+            return Judgement.LEAK
+        return found
+
+    def _sees_cell(self, cell: int, target: int, origin: np.ndarray, end: np.ndarray) -> Judgement:
+        low, high = self.graph.cells[target]
+        if not ((end > low) & (end < high)).all():
+            return Judgement.GRAZE
+        if self.lines is not None:
+            sight = self.lines.check(origin[None], end[None])[0]
+            return (Judgement.VISIBLE, Judgement.GRAZE, Judgement.BLOCKED)[sight]
+        path = portal_path(self.links, self.graph.cells, cell, target, origin, end - origin)
+        if path is None:
+            return Judgement.GRAZE
+        ids, starts = np.array(path, np.int64), np.array([0, len(path)])
+        line = Witnesses(np.array([cell]), np.array([target]), origin[None], end[None], ids, starts)
+        passed = passes_portals(line, self.graph, np.ones(1, bool))[0]
+        return (Judgement.BLOCKED, Judgement.GRAZE, Judgement.VISIBLE)[passed + 1]
+
+    def _sees_object(self, target: int, origin: np.ndarray, end: np.ndarray) -> Judgement:
+        """The object's first proper crossing must come before anything else opaque."""
+        times: dict[bool, list] = {True: [], False: []}
+        for triangles, opaque in ((self.lines, True), (self.glass, False)):
+            _, ids, kinds = triangles.hits(origin[None], end[None])
+            for triangle, kind in zip(ids, kinds, strict=True):
+                own = bool(triangles.owners[triangle] == target)
+                if own and kind == THROUGH:
+                    times[True].append(crossing_time(origin, end, triangles.triangles[triangle]))
+                elif opaque and not own:
+                    # A coplanar triangle has no crossing time; it counts as met at once.
+                    time = crossing_time(origin, end, triangles.triangles[triangle]) if kind == THROUGH else -1
+                    times[False].append(time)
+        if not times[True]:
+            return Judgement.GRAZE
+        first = min(times[True])
+        if not times[False] or first < min(times[False]):
+            return Judgement.VISIBLE
+        return Judgement.GRAZE if min(times[False]) < 0 else Judgement.BLOCKED
+
+    def _is_crack(self, origin: np.ndarray, end: np.ndarray) -> bool:
+        """Whether the sightline squeezes through a gap narrower than the seal: stopped when moved by it either way."""
+        if not self.seal_steps:
+            return False
+        along = (end - origin) / np.linalg.norm(end - origin)
+        first = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+        first /= np.linalg.norm(first)
+        second = np.cross(along, first)
+        angles = np.arange(8) * np.pi / 8
+        shift = self.seal_steps * (np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second))
+        # A crack is looked for along the way, not where the sightline leaves or arrives.
+        ends = origin + 0.999 * (end - origin)
+        stopped = [self.lines.check(origin + s * shift, ends + s * shift) != Sight.CLEAR for s in (1, -1)]
+        return bool((stopped[0] & stopped[1]).any())
+
+
+def sightline_end(candidates: Candidates, number: int, cells: np.ndarray) -> np.ndarray:
+    """End of a candidate's sightline [grid steps]: the middle of its way in the cell, or just behind the object.
+
+    The end is origin + direction rounded to float64, so that a case file repeats it digit by digit.
+    """
+    origin, direction = candidates.origins[number], candidates.directions[number]
+    reach = candidates.reach[number]
+    if candidates.kinds[number] == 1:
+        return origin + (origin + direction * min(reach, 2.0**26) * OVERSHOOT - origin)
+    low, high = cells[candidates.targets[number]]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first, last = (low - origin) / direction, (high - origin) / direction
+    enter, leave = np.fmin(first, last).max(), min(np.fmax(first, last).min(), reach)
+    end = origin + direction * (enter + leave) / 2
+    return origin + (end - origin)
