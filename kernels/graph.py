@@ -12,8 +12,8 @@ f64 = wp.float64
 class DeviceGraph:
     """Cells, portals and adjacency as Warp arrays, in grid steps.
 
-    `entries` row: (portal, cell behind it, axis, octant mask); bit o of the mask is set when a line whose direction lies
-    in octant o can cross that way. Bit i of an octant is set when direction component i is negative.
+    `entries` row: (portal, cell behind it, axis, octant mask); bit o of the mask is set when a line whose direction
+    lies in octant o can cross that way. Bit i of an octant is set when direction component i is negative.
     """
 
     cell_lo: wp.array(dtype=wp.vec3i)

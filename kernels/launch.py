@@ -45,8 +45,9 @@ def run_sliced(
 ) -> None:
     """Call `launch(first, last, slots, scratch, frames)` until all items are done.
 
-    On a GPU once, with many slots. On the CPU in chunks from `threads` threads, one slot each: Warp runs a CPU launch on
-    the calling thread and releases the GIL. Items may not depend on each other, so the result does not depend on this.
+    On a GPU once, with many slots. On the CPU in chunks from `threads` threads, one slot each: Warp runs a CPU launch
+    on the calling thread and releases the GIL. Items may not depend on each other, so the result does not depend on
+    this.
     """
     if count == 0:
         return

@@ -368,9 +368,7 @@ def _search(
                                 clearance = WIDEST_CLEARANCE
                                 while clearance >= f64(1.0):
                                     if (
-                                        widen(
-                                            work, lists, levels, spare, counts, s_lo, s_hi, t_lo, t_hi, clearance
-                                        )
+                                        widen(work, lists, levels, spare, counts, s_lo, s_hi, t_lo, t_hi, clearance)
                                         == STABBED
                                     ):
                                         wide = levels + LEVEL_SIZE

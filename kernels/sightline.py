@@ -1,0 +1,368 @@
+"""Sightlines against the true triangles, and the search for a clear one by aiming.
+
+A sightline is accepted only if float64 is certain that it clears every opaque triangle: each orientation carries a
+bound on its rounding, and a doubtful one counts as blocked. So an accepted sightline is never wrong; a rejected one may be
+clear. (The exact check of every stored witness is verify/sightline.py, which shares nothing with this file.)
+
+Source of the bound: Shewchuk 1997, "Adaptive Precision Floating-Point Arithmetic", orient3d, stage A.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from ..data.hierarchy import build_hierarchy
+from .launch import SlotSizes, run_sliced, vectors
+
+wp.set_module_options({"enable_backward": False})
+
+f64 = wp.float64
+
+# (7 + 56 e) e with e = 2**-53 is 7.8e-16 of the permanent; the product of 1-norms used here is never smaller than that.
+ORIENT_BOUND = wp.constant(wp.float64(1.0e-15))
+# Grid steps added to every node box: coordinates up to 2**24 carry rounding errors far below it.
+PADDING = wp.constant(wp.float64(0.001))
+# Sightline ends are multiples of 2**-10 grid steps, so that origin, direction and their sum are exact in float64.
+QUANTUM = wp.constant(wp.float64(1024.0))
+
+
+@wp.struct
+class Triangles:
+    """Opaque triangles in grid steps, who owns them, and their hierarchy."""
+
+    a: wp.array(dtype=wp.vec3i)
+    b: wp.array(dtype=wp.vec3i)
+    c: wp.array(dtype=wp.vec3i)
+    owner: wp.array(dtype=int)
+    node_lo: wp.array(dtype=wp.vec3i)
+    node_hi: wp.array(dtype=wp.vec3i)
+    links: wp.array(dtype=wp.vec2i)
+
+
+def device_triangles(triangles: np.ndarray, owners: np.ndarray, device: str = "cpu") -> Triangles:
+    """Copy opaque triangles (m, 3, 3) [grid steps] and their object ids to a device."""
+    nodes = build_hierarchy(np.stack([triangles.min(axis=1), triangles.max(axis=1)], axis=1))
+    out = Triangles()
+    out.a, out.b, out.c = (vectors(triangles[:, i], device) for i in range(3))
+    out.owner = wp.array(owners, dtype=int, device=device)
+    out.node_lo, out.node_hi = vectors(nodes.boxes[:, 0], device), vectors(nodes.boxes[:, 1], device)
+    out.links = wp.array(nodes.links, dtype=wp.vec2i, device=device)
+    return out
+
+
+@wp.func
+def real(v: wp.vec3i) -> wp.vec3d:
+    """Integer vector as float64."""
+    return wp.vec3d(f64(v[0]), f64(v[1]), f64(v[2]))
+
+
+@wp.func
+def certain_side(u: wp.vec3d, v: wp.vec3d, w: wp.vec3d) -> int:
+    """Sign of det(u, v, w) of differences of float64 points; 0 where rounding could have made it."""
+    det = wp.dot(u, wp.cross(v, w))
+    bound = (
+        ORIENT_BOUND
+        * (wp.abs(u[0]) + wp.abs(u[1]) + wp.abs(u[2]))
+        * (wp.abs(v[0]) + wp.abs(v[1]) + wp.abs(v[2]))
+        * (wp.abs(w[0]) + wp.abs(w[1]) + wp.abs(w[2]))
+    )
+    if det > bound:
+        return 1
+    if det < -bound:
+        return -1
+    return 0
+
+
+@wp.func
+def clears(p: wp.vec3d, q: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> bool:
+    """Whether the closed segment pq certainly misses the closed triangle abc."""
+    d = q - p
+    u = a - p
+    v = b - p
+    w = c - p
+    s0 = certain_side(d, u, v)
+    s1 = certain_side(d, v, w)
+    s2 = certain_side(d, w, u)
+    if (s0 > 0 or s1 > 0 or s2 > 0) and (s0 < 0 or s1 < 0 or s2 < 0):
+        return True
+    above = certain_side(u, v, w)
+    if above == 0:
+        return False
+    return above == certain_side(a - q, b - q, c - q)
+
+
+@wp.func
+def is_clear(scene: Triangles, p: wp.vec3d, q: wp.vec3d, except_owner: int) -> bool:
+    """Whether segment pq certainly clears every triangle, those of one object excepted (-1: none)."""
+    d = q - p
+    count = scene.links.shape[0]
+    node = int(0)
+    while node < count:
+        link = scene.links[node]
+        lo = real(scene.node_lo[node])
+        hi = real(scene.node_hi[node])
+        first = f64(0.0)
+        last = f64(1.0)
+        for i in range(3):
+            low = lo[i] - PADDING - p[i]
+            high = hi[i] + PADDING - p[i]
+            if d[i] == f64(0.0):
+                if low > f64(0.0) or high < f64(0.0):
+                    last = f64(-1.0)
+            else:
+                t0 = low / d[i]
+                t1 = high / d[i]
+                first = wp.max(first, wp.min(t0, t1))
+                last = wp.min(last, wp.max(t0, t1))
+        if first <= last:
+            item = link[1]
+            if item >= 0:
+                if scene.owner[item] != except_owner:
+                    if not clears(p, q, real(scene.a[item]), real(scene.b[item]), real(scene.c[item])):
+                        return False
+            node += 1
+        else:
+            node = link[0]
+    return True
+
+
+@wp.func
+def quantised(v: wp.vec3d) -> wp.vec3d:
+    """Nearest point whose coordinates are multiples of 2**-10 grid steps."""
+    return wp.vec3d(wp.round(v[0] * QUANTUM), wp.round(v[1] * QUANTUM), wp.round(v[2] * QUANTUM)) / QUANTUM
+
+
+@wp.kernel
+def _confirm(
+    scene: Triangles,
+    origins: wp.array(dtype=wp.vec3d),
+    ends: wp.array(dtype=wp.vec3d),
+    except_owner: wp.array(dtype=int),
+    first: int,
+    last: int,
+    slots: int,
+    clear_out: wp.array(dtype=wp.uint8),
+):
+    row = first + wp.tid()
+    while row < last:
+        clear_out[row] = wp.uint8(0)
+        if is_clear(scene, origins[row], ends[row], except_owner[row]):
+            clear_out[row] = wp.uint8(1)
+        row += slots
+
+
+@wp.func
+def random_point(state: wp.uint32, lo: wp.vec3d, hi: wp.vec3d) -> wp.vec3d:
+    """Uniform point of a box, kept off its faces by 1/64 of its size."""
+    out = wp.vec3d()
+    for i in range(3):
+        share = f64(0.015625) + f64(0.96875) * f64(wp.randf(state))
+        out[i] = lo[i] + share * (hi[i] - lo[i])
+    return out
+
+
+@wp.struct
+class Aims:
+    """Work of `launch_aim`: source and target boxes, object to hit (-1: none), and the object's triangle range."""
+
+    source_lo: wp.array(dtype=wp.vec3i)
+    source_hi: wp.array(dtype=wp.vec3i)
+    target_lo: wp.array(dtype=wp.vec3i)
+    target_hi: wp.array(dtype=wp.vec3i)
+    hint_origin: wp.array(dtype=wp.vec3d)
+    hint_end: wp.array(dtype=wp.vec3d)
+    owner: wp.array(dtype=int)
+    begin: wp.array(dtype=int)
+    end: wp.array(dtype=int)
+    seed: wp.array(dtype=int)
+
+
+@wp.func
+def pull(point: wp.vec3d, hint: wp.vec3d, reach: f64) -> wp.vec3d:
+    """The point moved towards the hint: reach 1 leaves it, 0 gives the hint."""
+    return hint + (point - hint) * reach
+
+
+@wp.kernel
+def _aim(
+    scene: Triangles,
+    a: wp.array(dtype=wp.vec3i),
+    b: wp.array(dtype=wp.vec3i),
+    c: wp.array(dtype=wp.vec3i),
+    running_area: wp.array(dtype=f64),
+    aims: Aims,
+    first: int,
+    last: int,
+    slots: int,
+    tries: int,
+    found_out: wp.array(dtype=wp.uint8),
+    origins_out: wp.array(dtype=wp.vec3d),
+    ends_out: wp.array(dtype=wp.vec3d),
+):
+    row = first + wp.tid()
+    while row < last:
+        state = wp.rand_init(aims.seed[row])
+        found_out[row] = wp.uint8(0)
+        owner = aims.owner[row]
+        attempt = int(0)
+        while attempt < tries:
+            origin = random_point(state, real(aims.source_lo[row]), real(aims.source_hi[row]))
+            end = wp.vec3d()
+            if owner < 0:
+                end = random_point(state, real(aims.target_lo[row]), real(aims.target_hi[row]))
+                # Every other attempt stays near the line that the axial model allows, nearer and nearer.
+                if attempt % 2 == 1:
+                    reach = f64(1.0) / f64(1 + attempt)
+                    origin = pull(origin, aims.hint_origin[row], reach)
+                    end = pull(end, aims.hint_end[row], reach)
+            else:
+                low = int(aims.begin[row])
+                high = int(aims.end[row] - 1)
+                before = f64(0.0)
+                if low > 0:
+                    before = running_area[low - 1]
+                pick = before + f64(wp.randf(state)) * (running_area[high] - before)
+                while low < high:
+                    middle = (low + high) // 2
+                    if running_area[middle] < pick:
+                        low = middle + 1
+                    else:
+                        high = middle
+                s = wp.sqrt(f64(wp.randf(state)))
+                t = f64(wp.randf(state))
+                end = real(a[low]) * (f64(1.0) - s) + real(b[low]) * (s * (f64(1.0) - t)) + real(c[low]) * (s * t)
+            origin = quantised(origin)
+            end = quantised(end)
+            attempt += 1
+            if is_clear(scene, origin, end, owner):
+                found_out[row] = wp.uint8(1)
+                origins_out[row] = origin
+                ends_out[row] = end
+                attempt = tries
+        row += slots
+
+
+def launch_confirm(
+    scene: Triangles,
+    origins: np.ndarray,
+    ends: np.ndarray,
+    owners: np.ndarray,
+    *,
+    threads: int = 1,
+    device: str = "cpu",
+) -> np.ndarray:
+    """Sightlines that certainly clear every opaque triangle.
+
+    Args:
+        scene: opaque triangles.
+        origins: [grid steps], shape (n, 3), float64.
+        ends: likewise.
+        owners: object whose triangles are no obstacle (the target), or -1, shape (n,), int.
+        threads: CPU threads.
+        device: Warp device.
+
+    Returns:
+        Shape (n,), bool. True is never wrong; False may be clear by less than rounding.
+    """
+    count = len(origins)
+    starts = wp.array(np.ascontiguousarray(origins, np.float64), dtype=wp.vec3d, device=device)
+    stops = wp.array(np.ascontiguousarray(ends, np.float64), dtype=wp.vec3d, device=device)
+    owner = wp.array(np.ascontiguousarray(owners, np.int32), dtype=int, device=device)
+    clear = wp.zeros(count, dtype=wp.uint8, device=device)
+
+    def launch(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
+        wp.launch(_confirm, dim=slots, inputs=[scene, starts, stops, owner, first, last, slots, clear], device=device)
+
+    run_sliced(launch, count, SlotSizes(1, 1), module=__name__, threads=threads, device=device)
+    return clear.numpy().astype(bool)
+
+
+@dataclass
+class AimTargets:
+    """Triangles of all objects that may be aimed at, opaque or not, grouped by object, with their running area."""
+
+    a: wp.array
+    b: wp.array
+    c: wp.array
+    running_area: wp.array
+
+
+def aim_targets(triangles: np.ndarray, device: str = "cpu") -> AimTargets:
+    """Copy the triangles (m, 3, 3) of all objects, in object order, to a device."""
+    edges = (triangles[:, 1:] - triangles[:, :1]).astype(float)
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    return AimTargets(
+        *(vectors(triangles[:, i], device) for i in range(3)),
+        wp.array(np.cumsum(area), dtype=wp.float64, device=device),
+    )
+
+
+def launch_aim(
+    scene: Triangles,
+    targets: AimTargets,
+    sources: np.ndarray,
+    boxes: np.ndarray,
+    hints: np.ndarray,
+    owners: np.ndarray,
+    ranges: np.ndarray,
+    seeds: np.ndarray,
+    *,
+    tries: int,
+    threads: int = 1,
+    device: str = "cpu",
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Shoot from random points of each source box at its target until a sightline is clear.
+
+    Args:
+        scene: opaque triangles.
+        targets: triangles to aim at.
+        sources: source box of each row [grid steps], shape (n, 2, 3), int32.
+        boxes: target box of each row; used where owner is -1.
+        hints: origin and end of a sightline that the axial model allows [grid steps], shape (n, 2, 3), float64.
+        owners: object to hit, or -1 to reach a point of the target box.
+        ranges: the object's first and past-the-last row in `targets`, shape (n, 2), int.
+        seeds: of each row's random stream, shape (n,), int.
+        tries: sightlines shot a row at most.
+        threads: CPU threads.
+        device: Warp device.
+
+    Returns:
+        Found, shape (n,), bool; origins and ends [grid steps], shape (n, 3), float64, defined where found.
+    """
+    count = len(sources)
+    aims = Aims()
+    aims.source_lo, aims.source_hi = vectors(sources[:, 0], device), vectors(sources[:, 1], device)
+    aims.target_lo, aims.target_hi = vectors(boxes[:, 0], device), vectors(boxes[:, 1], device)
+    aims.hint_origin, aims.hint_end = (
+        wp.array(np.ascontiguousarray(hints[:, i], np.float64), dtype=wp.vec3d, device=device) for i in (0, 1)
+    )
+    for name, values in (("owner", owners), ("begin", ranges[:, 0]), ("end", ranges[:, 1]), ("seed", seeds)):
+        setattr(aims, name, wp.array(np.ascontiguousarray(values, np.int32), dtype=int, device=device))
+    found = wp.zeros(count, dtype=wp.uint8, device=device)
+    origins, ends = (wp.zeros(count, dtype=wp.vec3d, device=device) for _ in range(2))
+
+    def launch(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
+        wp.launch(
+            _aim,
+            dim=slots,
+            inputs=[
+                scene,
+                targets.a,
+                targets.b,
+                targets.c,
+                targets.running_area,
+                aims,
+                first,
+                last,
+                slots,
+                tries,
+                found,
+                origins,
+                ends,
+            ],
+            device=device,
+        )
+
+    run_sliced(launch, count, SlotSizes(1, 1), module=__name__, threads=threads, device=device)
+    return found.numpy().astype(bool), origins.numpy(), ends.numpy()

@@ -1,0 +1,129 @@
+"""Walk sightlines through the cell-and-portal graph: the cells entered and the portals crossed, in order."""
+
+import numpy as np
+import warp as wp
+
+from .graph import DeviceGraph
+from .launch import SlotSizes, run_sliced
+
+wp.set_module_options({"enable_backward": False})
+
+f64 = wp.float64
+
+# A crossing closer than this to a portal's edge [grid steps] is not called a crossing: float64 could not be sure.
+EDGE_MARGIN = wp.constant(wp.float64(1.0e-6))
+MAX_STEPS = wp.constant(1024)
+
+
+@wp.func
+def crossing_portal(graph: DeviceGraph, cell: int, axis: int, forward: bool, point: wp.vec3d) -> wp.vec2i:
+    """The portal through which a line leaves a cell at `point` of the face on `axis`, and the cell behind; or (-1, -1)."""
+    u = int((axis + 1) % 3)
+    v = int((axis + 2) % 3)
+    for k in range(graph.starts[cell], graph.starts[cell + 1]):
+        entry = graph.entries[k]
+        if entry[2] == axis and (((entry[3] >> 0) & 1) == 1) == forward:
+            lo = graph.portal_lo[entry[0]]
+            hi = graph.portal_hi[entry[0]]
+            if (
+                point[u] > f64(lo[u]) + EDGE_MARGIN
+                and point[u] < f64(hi[u]) - EDGE_MARGIN
+                and point[v] > f64(lo[v]) + EDGE_MARGIN
+                and point[v] < f64(hi[v]) - EDGE_MARGIN
+            ):
+                return wp.vec2i(entry[0], entry[1])
+    return wp.vec2i(-1, -1)
+
+
+@wp.kernel
+def _walk(
+    graph: DeviceGraph,
+    sources: wp.array(dtype=int),
+    origins: wp.array(dtype=wp.vec3d),
+    ends: wp.array(dtype=wp.vec3d),
+    spots: wp.array(dtype=wp.int64),
+    first: int,
+    last: int,
+    slots: int,
+    steps_out: wp.array(dtype=int),
+    reached_out: wp.array(dtype=int),
+    portals_out: wp.array(dtype=int),
+):
+    row = first + wp.tid()
+    while row < last:
+        cell = int(sources[row])
+        p = origins[row]
+        d = ends[row] - p
+        steps = int(0)
+        walking = bool(True)
+        while walking:
+            leave = f64(1.0)
+            axis = int(-1)
+            for i in range(3):
+                t = f64(2.0)
+                if d[i] > f64(0.0):
+                    t = (f64(graph.cell_hi[cell][i]) - p[i]) / d[i]
+                if d[i] < f64(0.0):
+                    t = (f64(graph.cell_lo[cell][i]) - p[i]) / d[i]
+                if t < leave:
+                    leave = t
+                    axis = i
+            if axis < 0:
+                walking = False
+            else:
+                step = crossing_portal(graph, cell, axis, d[axis] > f64(0.0), p + d * leave)
+                cell = step[1]
+                if step[0] >= 0 and portals_out.shape[0] > 0:
+                    portals_out[spots[row] + wp.int64(steps)] = step[0]
+                steps += 1
+                if cell < 0 or steps == MAX_STEPS:
+                    cell = -1
+                    walking = False
+        steps_out[row] = steps
+        reached_out[row] = cell
+        row += slots
+
+
+def launch_walk(
+    graph: DeviceGraph,
+    sources: np.ndarray,
+    origins: np.ndarray,
+    ends: np.ndarray,
+    *,
+    threads: int = 1,
+    device: str = "cpu",
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Portals that each segment crosses on its way.
+
+    Args:
+        graph: on the same device.
+        sources: cell that holds each origin, shape (n,), int.
+        origins: [grid steps], shape (n, 3), float64.
+        ends: likewise.
+        threads: CPU threads.
+        device: Warp device.
+
+    Returns:
+        The cell that holds each end, -1 where the walk met a wall or a portal's edge; starts, shape (n + 1,), int64; and
+        the portals of row r at starts[r]:starts[r + 1], int32 (undefined where the walk failed).
+    """
+    count = len(sources)
+    source = wp.array(np.ascontiguousarray(sources, np.int32), dtype=int, device=device)
+    p, q = (wp.array(np.ascontiguousarray(x, np.float64), dtype=wp.vec3d, device=device) for x in (origins, ends))
+    steps, reached = (wp.zeros(count, dtype=int, device=device) for _ in range(2))
+
+    def run(spots: np.ndarray, total: int) -> wp.array:
+        places = wp.array(spots, dtype=wp.int64, device=device)
+        portals = wp.zeros(total, dtype=int, device=device)
+
+        def launch(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
+            inputs = [graph, source, p, q, places, first, last, slots, steps, reached, portals]
+            wp.launch(_walk, dim=slots, inputs=inputs, device=device)
+
+        run_sliced(launch, count, SlotSizes(1, 1), module=__name__, threads=threads, device=device)
+        return portals
+
+    run(np.zeros(count, np.int64), 0)
+    starts = np.concatenate([[0], np.cumsum(steps.numpy(), dtype=np.int64)])
+    portals = run(starts[:-1], int(starts[-1]))
+    return reached.numpy(), starts, portals.numpy()
