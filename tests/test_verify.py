@@ -142,6 +142,22 @@ def test_grazes_are_not_violations(house):
     assert judge.judge("cell", 0, 2, *from_wall) is Judgement.BLOCKED
 
 
+def test_an_object_is_seen_only_before_all_others(house):
+    """Past the desk (object 17, its top at height 8) to the wall behind it (object 12)."""
+    judge = make_judge(house)
+
+    def look(target, height, start=46):
+        origin, end = np.array([[start, 36, height], [90, 36, height]]) * 64.0
+        return judge.judge("object", 2, target, origin, end)
+
+    assert look(17, 3) is Judgement.VISIBLE
+    assert look(12, 3) is Judgement.BLOCKED
+    assert look(12, 8) is Judgement.GRAZE
+    assert look(12, 9) is Judgement.VISIBLE
+    assert look(17, 9) is Judgement.GRAZE
+    assert look(17, 3, start=63) is Judgement.BLOCKED, "from inside the desk"
+
+
 @pytest.mark.parametrize("kind", ["house", "bare"])
 def test_false_witnesses_are_refuted(kind, request, tmp_path):
     def fresh():
