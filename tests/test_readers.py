@@ -16,7 +16,7 @@ from viewcell.data.scene_folder import read_scene, write_scene
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "scenes"
 needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="no shared scenes folder beside the checkout")
-CUBE = trimesh.creation.box((1, 2, 3))
+CUBE = trimesh.creation.box(bounds=[[5, 6, 7], [6, 8, 10]])  # away from its frame's origin
 
 
 def by_name(scene: Scene) -> dict[str, tuple[str, Role]]:

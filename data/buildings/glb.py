@@ -24,8 +24,10 @@ def write_glb(scene: Scene, path: str | Path) -> None:
     roles back from it. Spaces, openings and coarser levels are not written.
 
     Raises:
-        InputError: the file cannot be written.
+        InputError: the scene has no objects, or the file cannot be written.
     """
+    if not scene.objects:
+        raise InputError(f"{path}: expected objects to write, found an empty scene")
     import trimesh
 
     materials = {
