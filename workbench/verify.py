@@ -157,7 +157,7 @@ def verify(bake: "Bake", *, rays: int = 1_000_000, seed: int = 0, progress: bool
     start = time.perf_counter()
     _confirm_all(bake, judge, progress, result)
     result.seconds["witnesses"] = time.perf_counter() - start
-    result.counts = _count_pairs(bake, caster)
+    result.counts = count_pairs(bake, caster)
     return result
 
 
@@ -313,8 +313,8 @@ def _confirm_all(bake: "Bake", judge: Judge, progress: bool, result: VerifyResul
             outcome.add(kind, part.cells, part.targets, reasons)
 
 
-def _count_pairs(bake: "Bake", caster: Caster | None) -> list[Counts]:
-    """Pairs by class of targets: inhabitable cells, all cells, objects."""
+def count_pairs(bake: "Bake", caster: Caster | None = None) -> list[Counts]:
+    """Pairs by class of targets: inhabitable cells, all cells, objects; with what a caster's rays saw, if given."""
     inhabitable = bake.graph.inhabitable
     tables = [
         ("cells, inhabitable", bake.potential_cells[:, inhabitable], bake.cell_to_cell, "reached_cell_id", inhabitable),

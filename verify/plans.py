@@ -1,0 +1,240 @@
+"""Pictures of a bake: storey plans, and the potentially visible set of a cell in plan and elevation."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PatchCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+
+from ..data.graph import OTHER_AXES, CellGraph
+from ..data.scene import Role, Scene
+
+# Blue and orange stay apart for colour-blind readers and in print.
+COLOURS = {
+    "source": "#f28482",
+    "seen": "#a9d6e5",
+    "unknown": "#ffb703",
+    "hidden": "#ffffff",
+    "inhabitable": "#fdf0d5",
+    "other": "#ffffff",
+}
+WALL, GLASS, PORTAL, OPENING, SIGHTLINE = "#222222", "#5fa8d3", "#d1495b", "#2a9d8f", "#023e8a"
+CELL_EDGE, NO_CELL = "#9aa5b1", "#d3d8de"
+SECTION_HEIGHT_M = 1.2
+# Floors further apart than this belong to different storeys.
+STOREY_GAP_M = 1.5
+LABELS_MOST = 60
+
+
+@dataclass(frozen=True)
+class Storey:
+    """One level of a building.
+
+    Attributes:
+        floor: height of most of its inhabitable area [grid steps].
+        cells: its inhabitable cells, shape (n,), int.
+    """
+
+    floor: int
+    cells: np.ndarray
+
+
+@dataclass(frozen=True)
+class Section:
+    """A cut through the model, perpendicular to an axis.
+
+    Attributes:
+        axis: 2 for a plan.
+        level: where [grid steps]; half a step off the grid, so that it meets no vertex.
+    """
+
+    axis: int
+    level: float
+
+    @property
+    def across(self) -> tuple[int, int]:
+        """The axes drawn to the right and up."""
+        u, v = OTHER_AXES[self.axis]
+        return int(u), int(v)
+
+    def cuts(self, boxes: np.ndarray) -> np.ndarray:
+        """Boxes that the section meets, shape (n,), bool, for boxes of shape (n, 2, 3)."""
+        return (boxes[:, 0, self.axis] < self.level) & (self.level < boxes[:, 1, self.axis])
+
+
+def find_storeys(graph: CellGraph, grid_m: float) -> list[Storey]:
+    """Inhabitable cells grouped by the height of their floors, lowest first."""
+    cells = np.flatnonzero(graph.inhabitable)
+    floors = graph.cells[cells, 0, 2]
+    order = np.argsort(floors, kind="stable")
+    breaks = np.flatnonzero(np.diff(floors[order]) > STOREY_GAP_M / grid_m) + 1
+    storeys = []
+    for group in np.split(cells[order], breaks):
+        if len(group):
+            size = np.diff(graph.cells[group], axis=1)[:, 0].astype(np.float64)
+            heights, slot = np.unique(graph.cells[group, 0, 2], return_inverse=True)
+            areas = np.bincount(slot, weights=size[:, 0] * size[:, 1])
+            storeys.append(Storey(int(heights[areas.argmax()]), np.sort(group)))
+    return storeys
+
+
+def plan_of(storey: Storey, grid_m: float) -> Section:
+    """The storey's plan: the section 1.2 m above its floor."""
+    return Section(2, int(storey.floor + SECTION_HEIGHT_M / grid_m) + 0.5)
+
+
+def section_lines(triangles: np.ndarray, section: Section) -> np.ndarray:
+    """Where triangles meet the section [grid steps], shape (n, 2, 2), float64: ends of segments in drawn axes."""
+    side = triangles[:, :, section.axis] > section.level
+    cut = side.any(axis=1) & ~side.all(axis=1)
+    corners, side = triangles[cut].astype(np.float64), side[cut]
+    # The corner that is alone on its side starts both edges that cross.
+    lone = np.where(side.sum(axis=1) == 1, side.argmax(axis=1), (~side).argmax(axis=1))
+    row = np.arange(len(corners))
+    apex = corners[row, lone]
+    ends = []
+    for step in (1, 2):
+        other = corners[row, (lone + step) % 3]
+        share = (section.level - apex[:, section.axis]) / (other - apex)[:, section.axis]
+        ends.append((apex + share[:, None] * (other - apex))[:, section.across])
+    return np.stack(ends, axis=1) if len(corners) else np.zeros((0, 2, 2))
+
+
+class Painter:
+    """Draws sections of one bake's graph and scene, in metres."""
+
+    def __init__(self, graph: CellGraph, scene: Scene | None, grid_m: float):
+        """Take the graph, the scene (None: cells alone) and the grid step [m]."""
+        self.graph, self.grid_m = graph, grid_m
+        triangles, owners = scene.triangles() if scene else (np.zeros((0, 3, 3), np.int32), np.zeros(0, np.int32))
+        glass = scene.object_mask(Role.TRANSPARENT)[owners] if scene else np.zeros(0, bool)
+        self._opaque, self._glass = triangles[~glass], triangles[glass]
+
+    def storey(self, storey: Storey, title: str, path: Path) -> None:
+        """Plan with cells and portals, written as PNG."""
+        section = plan_of(storey, self.grid_m)
+        figure, (axes,) = self._figure([section])
+        kinds = np.where(self.graph.inhabitable, "inhabitable", "other")
+        self._draw(axes, section, kinds)
+        self._portals(axes, section)
+        self._labels(axes, storey, section)
+        axes.set_title(title)
+        handles = [Patch(facecolor=COLOURS["inhabitable"], edgecolor=CELL_EDGE, label="inhabitable cell")]
+        handles += [Patch(facecolor="white", edgecolor=CELL_EDGE, label="other cell"), *self._geometry_handles()]
+        handles += [Line2D([], [], color=PORTAL, lw=2.2, label="portal")]
+        handles += [Patch(facecolor="none", edgecolor=OPENING, hatch="////", label="portal in floor or ceiling")]
+        _finish(figure, handles, path)
+
+    def visible_set(
+        self, cell: int, kinds: np.ndarray, sightlines: np.ndarray, section: Section, title: str, path: Path
+    ) -> None:
+        """Plan and side elevation of a cell's potentially visible set, written as PNG.
+
+        Args:
+            cell: the source.
+            kinds: key of COLOURS for each cell, shape (cells,), str.
+            sightlines: witnesses [grid steps], shape (n, 2, 3), float64.
+            section: the plan.
+            title: of the picture.
+            path: of the PNG.
+        """
+        centre = self.graph.cells[cell].mean(axis=0)
+        size = np.ptp(self.graph.cells.reshape(-1, 3), axis=0)
+        looking = 1 if size[0] >= size[1] else 0
+        elevation = Section(looking, np.floor(centre[looking]) + 0.5)
+        figure, panels = self._figure([section, elevation])
+        names = "xyz"
+        for axes, cut in zip(panels, (section, elevation), strict=True):
+            self._draw(axes, cut, kinds)
+            lines = sightlines[:, :, cut.across] * self.grid_m
+            faint = 0.9 if len(lines) < 30 else 0.45
+            axes.add_collection(LineCollection(lines, colors=SIGHTLINE, linewidths=0.7, alpha=faint, zorder=4))
+            axes.plot(*lines[:, 0].T, ".", color=SIGHTLINE, markersize=2.5, zorder=5)
+            height = cut.level * self.grid_m
+            axes.set_title(f"{'plan' if cut.axis == 2 else 'elevation'}, cut at {names[cut.axis]} = {height:.2f} m")
+        figure.suptitle(title)
+        words = {"source": "view cell", "seen": "seen (witness)", "unknown": "unknown (potential)", "hidden": "hidden"}
+        handles = [Patch(facecolor=COLOURS[k], edgecolor=CELL_EDGE, label=word) for k, word in words.items()]
+        handles += [
+            *self._geometry_handles(),
+            Line2D([], [], color=SIGHTLINE, lw=1, label="witness sightline, projected"),
+        ]
+        _finish(figure, handles, path)
+
+    def _geometry_handles(self) -> list:
+        handles = [Patch(facecolor=NO_CELL, label="no cell")]
+        handles += [Line2D([], [], color=WALL, lw=1.4, label="opaque surface")] if len(self._opaque) else []
+        return handles + ([Line2D([], [], color=GLASS, lw=1.4, label="transparent")] if len(self._glass) else [])
+
+    def _figure(self, sections: list[Section]) -> tuple[Figure, list[Axes]]:
+        """A figure whose panels share the model's proportions, one above the other."""
+        low, high = self.graph.cells[:, 0].min(axis=0) * self.grid_m, self.graph.cells[:, 1].max(axis=0) * self.grid_m
+        spans = [(high - low)[list(section.across)] for section in sections]
+        shares = [max(float(span[1] / span[0]), 0.12) for span in spans]
+        width = 12.0 if sum(shares) <= 1.2 else max(7.0, 14.4 / sum(shares))
+        size = (width, width * sum(shares) + 0.8 * len(sections) + 0.4)
+        figure = Figure(figsize=size, layout="constrained")
+        panels = figure.subplots(len(sections), 1, squeeze=False, height_ratios=shares)[:, 0]
+        for axes, section in zip(panels, sections, strict=True):
+            u, v = section.across
+            margin = 0.02 * float(max(high - low))
+            axes.set(xlim=(low[u] - margin, high[u] + margin), ylim=(low[v] - margin, high[v] + margin))
+            axes.set_facecolor(NO_CELL)
+            axes.set(aspect="equal", xlabel=f"{'xyz'[u]} [m]", ylabel=f"{'xyz'[v]} [m]")
+        return figure, list(panels)
+
+    def _draw(self, axes: Axes, section: Section, kinds: np.ndarray) -> None:
+        """Cells coloured by kind, then the model's cut surfaces."""
+        cut = section.cuts(self.graph.cells)
+        for kind in ("other", "hidden", "inhabitable", "unknown", "seen", "source"):
+            chosen = np.flatnonzero(cut & (kinds == kind))
+            edge = "#c9d1d9" if kind in ("other", "hidden") else CELL_EDGE
+            rectangles = [self._rectangle(box, section) for box in self.graph.cells[chosen]]
+            style = {"facecolor": COLOURS[kind], "edgecolor": edge, "linewidth": 0.4, "zorder": 1}
+            axes.add_collection(PatchCollection(rectangles, match_original=False, **style))
+        for triangles, colour in ((self._glass, GLASS), (self._opaque, WALL)):
+            lines = section_lines(triangles, section) * self.grid_m
+            axes.add_collection(LineCollection(lines, colors=colour, linewidths=0.9, zorder=3))
+
+    def _rectangle(self, box: np.ndarray, section: Section) -> Rectangle:
+        u, v = section.across
+        low, high = box[0] * self.grid_m, box[1] * self.grid_m
+        return Rectangle((low[u], low[v]), high[u] - low[u], high[v] - low[v])
+
+    def _portals(self, axes: Axes, section: Section) -> None:
+        """Portals in walls as strokes, portals in the floors and ceilings of the cut cells as hatched rectangles."""
+        boxes, upright = self.graph.portals, self.graph.portal_axis != section.axis
+        u, v = section.across
+        cut = boxes[upright & section.cuts(boxes)] * self.grid_m
+        strokes = LineCollection(cut[:, :, [u, v]], colors=PORTAL, linewidths=1.8, zorder=5, capstyle="butt")
+        axes.add_collection(strokes)
+        shown = section.cuts(self.graph.cells)[self.graph.portal_cells].any(axis=1) & ~upright
+        flat = [self._rectangle(box, section) for box in boxes[shown]]
+        style = {"facecolor": "none", "edgecolor": OPENING, "hatch": "////", "linewidth": 0.5, "alpha": 0.45}
+        axes.add_collection(PatchCollection(flat, match_original=False, zorder=2, **style))
+
+    def _labels(self, axes: Axes, storey: Storey, section: Section) -> None:
+        """Names or ids of the largest inhabitable cells."""
+        cells = storey.cells[section.cuts(self.graph.cells[storey.cells])]
+        size = np.diff(self.graph.cells[cells], axis=1)[:, 0].astype(np.float64)
+        largest = cells[np.argsort(-size[:, 0] * size[:, 1], kind="stable")[:LABELS_MOST]]
+        for cell in largest:
+            place = self.graph.cells[cell].mean(axis=0)[:2] * self.grid_m
+            name = str(self.graph.cell_names[cell])
+            text = f"{cell}\n{name}" if name else str(cell)
+            axes.text(*place, text, ha="center", va="center", fontsize=6, color="#495057", zorder=6, clip_on=True)
+
+
+def _finish(figure: Figure, handles: list, path: Path) -> None:
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=4 if len(handles) > 6 else len(handles),
+        frameon=False,
+        fontsize=9,
+    )
+    figure.savefig(path, dpi=110)
