@@ -65,6 +65,33 @@ def _best_plane(rectangles: np.ndarray, box: np.ndarray, axis: int, threshold: f
     return float(area[pick] / (size[u] * size[v])), int(planes[pick])
 
 
+def cut_rooms(cells: np.ndarray, rooms: np.ndarray) -> np.ndarray:
+    """Cut cells at the floors and ceilings of rooms that the model names but does not build.
+
+    Args:
+        cells: disjoint boxes, shape (n, 2, 3), int32.
+        rooms: boxes of the rooms, shape (m, 2, 3), int.
+
+    Returns:
+        Boxes with the same union, shape (k, 2, 3), int32. Only cells that share more than half of their footprint with
+        a room are cut by it: a view cell should not reach from a room into the ground under it.
+    """
+    for low, high in rooms:
+        corner_low, corner_high = np.maximum(cells[:, 0, :2], low[:2]), np.minimum(cells[:, 1, :2], high[:2])
+        shared = np.prod(np.maximum(corner_high - corner_low, 0).astype(float), axis=1)
+        footprint = np.prod((cells[:, 1, :2] - cells[:, 0, :2]).astype(float), axis=1)
+        for k in (low[2], high[2]):
+            crossing = (shared > 0.5 * footprint) & (cells[:, 0, 2] < k) & (cells[:, 1, 2] > k)
+            if crossing.any():
+                upper = cells[crossing].copy()
+                upper[:, 0, 2] = k
+                cells = cells.copy()
+                cells[crossing, 1, 2] = k
+                cells = np.concatenate([cells, upper])
+                shared, footprint = (np.concatenate([x, x[crossing]]) for x in (shared, footprint))
+    return cells
+
+
 def merge(leaves: np.ndarray, opaque: OpaquePlanes) -> np.ndarray:
     """Merge neighbours that share one identical, wholly open face, largest faces first.
 
@@ -124,6 +151,8 @@ class PlaneIndex:
     def __init__(self, opaque: OpaquePlanes) -> None:
         self._planes: dict[tuple[int, int], np.ndarray] = {}
         for axis, boxes in enumerate(opaque.boxes):
+            if not len(boxes):
+                continue
             planes, starts = np.unique(boxes[:, 0, axis], return_index=True)
             for k, part in zip(planes, np.split(boxes, starts[1:]), strict=True):
                 self._planes[axis, int(k)] = part[:, :, OTHER_AXES[axis]].astype(np.int64)

@@ -283,7 +283,7 @@ def narrow_slopes(work: wp.array(dtype=f64), lists: int, level: int, before: vec
     """Tighten the slope bounds of a level by every two-cycle that a row at or past `before` takes part in.
 
     Returns:
-        HIDDEN as soon as some pair of axes has no open slope interval, else a bit mask of the bounds that moved times 4.
+        HIDDEN as soon as some pair of axes has no open slope interval, else 1 + 4 times a bit mask of moved bounds.
     """
     moved = int(0)
     for u in range(3):
@@ -509,7 +509,7 @@ def decide(
 
 @wp.func
 def offsets(m: vec6d) -> wp.vec3d:
-    """Xi (with xi_z = 0) in the middle of what the maxima M allow: the line that keeps clear of every row.
+    """Offsets xi (xi_z = 0) in the middle of what the maxima M allow: the line that keeps clear of every row.
 
     Shortest paths close M over the third axis first, so the interval of xi_x is exact, then that of xi_y given xi_x.
     """

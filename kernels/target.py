@@ -1,7 +1,7 @@
 """Target search: is there a sightline from one box to another, past every blocker?
 
-A branch-and-bound over lines instead of portal sequences. Take the middle line of what is still possible and look up the
-blockers it crosses between source and target. None: VISIBLE, and the line is the witness. Else the line must pass
+A branch-and-bound over lines instead of portal sequences. Take the middle line of what is still possible and look up
+the blockers it crosses between source and target. None: VISIBLE, and the line is the witness. Else the line must pass
 blocker R on one of its four sides, and "crosses the plane of R below its low edge" is one more linear row of the
 stabbing system (kernels/stab.py): four children, disjoint, most of them empty at once. No child left: HIDDEN. Open
 space costs nothing however finely it was cut into cells, which is where portal sequences explode.
@@ -64,7 +64,7 @@ class BlockerTree:
 
 @wp.struct
 class Pairs:
-    """Work: boxes, and rows (source box, target box, strict) to join; strict leaves out blockers at the target's face."""
+    """Boxes, and rows (source box, target box, strict) to join; strict leaves out blockers at the target's face."""
 
     lo: wp.array(dtype=wp.vec3i)
     hi: wp.array(dtype=wp.vec3i)
@@ -193,7 +193,7 @@ def scan(
 ) -> wp.vec2i:
     """The strongest blocker that the line crosses between leaving s and entering t, and the order of its sides.
 
-    Exact for integer w: every crossing time is an integer multiple of 1/4. Touching a blocker's edge counts as crossing.
+    Exact for integer w: every crossing time is an integer multiple of 1/4. Touching an edge counts as crossing.
     Returns (-1, 0) if the line is clear.
     """
     leave = wp.min(w[0] * s_hi[0] - xi[0], wp.min(w[1] * s_hi[1] - xi[1], w[2] * s_hi[2] - xi[2]))
@@ -243,7 +243,7 @@ def append_side(
         below = False
     if inside:
         below = not below
-    # Below: the plane is crossed before the edge, T_axis(plane) < T_b(edge), so xi_axis - xi_b >= w_axis plane - w_b edge.
+    # Below: the plane is crossed before the edge, T_axis(plane) < T_b(edge): xi_axis - xi_b >= w_axis plane - w_b edge.
     i = int(axis)
     j = int(b)
     first = lo[axis]
@@ -477,9 +477,9 @@ def launch_target_search(
         device: Warp device.
 
     Returns:
-        Answers. Hidden is exact: no open set of lines passes. Visible is exact for the blockers given, and its line keeps
-        the widest clearance that was found (1024, 256, ... 1 grid steps, or whatever the first line had). Unknown is
-        neither: keep it.
+        Answers. Hidden is exact: no open set of lines passes. Visible is exact for the blockers given, and its line
+        keeps the widest clearance that was found (1024, 256, ... 1 grid steps, or whatever the first line had). Unknown
+        is neither: keep it.
     """
     count = len(rows)
     work = Pairs()

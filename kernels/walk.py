@@ -17,7 +17,7 @@ MAX_STEPS = wp.constant(1024)
 
 @wp.func
 def crossing_portal(graph: DeviceGraph, cell: int, axis: int, forward: bool, point: wp.vec3d) -> wp.vec2i:
-    """The portal through which a line leaves a cell at `point` of the face on `axis`, and the cell behind; or (-1, -1)."""
+    """The portal through which a line leaves a cell at `point` of its face, and the cell behind; or (-1, -1)."""
     u = int((axis + 1) % 3)
     v = int((axis + 2) % 3)
     for k in range(graph.starts[cell], graph.starts[cell + 1]):
@@ -104,8 +104,8 @@ def launch_walk(
         device: Warp device.
 
     Returns:
-        The cell that holds each end, -1 where the walk met a wall or a portal's edge; starts, shape (n + 1,), int64; and
-        the portals of row r at starts[r]:starts[r + 1], int32 (undefined where the walk failed).
+        The cell that holds each end, -1 where the walk met a wall or a portal's edge; starts, shape (n + 1,), int64;
+        and the portals of row r at starts[r]:starts[r + 1], int32 (undefined where the walk failed).
     """
     count = len(sources)
     source = wp.array(np.ascontiguousarray(sources, np.int32), dtype=int, device=device)

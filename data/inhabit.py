@@ -1,0 +1,113 @@
+"""Inhabitable cells: where an observer may stand, and why.
+
+By rooms (IfcSpace) where the model names them. Else by flooding: doors, windows and voids are shut, and what the
+outside does not reach is a room. Where neither works the reason is reported with the path by which the outside leaks in.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+from .graph import CellGraph
+from .scene import Scene
+from .solids import winding_numbers
+
+SMALLEST_SIDE_M = 0.3
+SMALLEST_ROOM_M3 = 5.0
+SHUT_MARGIN_M = 0.01
+# Sample points an axis when a cell's share of the rooms is estimated.
+SAMPLES = 4
+
+
+@dataclass
+class Inhabited:
+    """Which cells are inhabitable.
+
+    Attributes:
+        mask: shape (cells,), bool.
+        names: the room of each cell, "" where none, shape (cells,), object.
+        reason: one line: by what rule, and what stood in the way of a better one.
+        leak: cells from the outside to the largest leaking room, in order; empty if nothing leaks.
+    """
+
+    mask: np.ndarray
+    names: np.ndarray
+    reason: str
+    leak: list[int] = field(default_factory=list)
+
+
+def find_inhabitable(scene: Scene, graph: CellGraph) -> Inhabited:
+    """Cells an observer may stand in; the graph must be free of dead cells."""
+    sides = (graph.cells[:, 1] - graph.cells[:, 0]) * scene.grid_m
+    roomy = sides.min(axis=1) > SMALLEST_SIDE_M
+    if scene.spaces:
+        names = _rooms_of(scene, graph, roomy)
+        mask = names != ""
+        if mask.any():
+            return Inhabited(mask, names, f"inside the model's {len(scene.spaces)} rooms")
+    names = np.full(graph.cell_count, "", object)
+    enclosed, leak = _flood(scene, graph)
+    mask = enclosed & roomy
+    if mask.any():
+        return Inhabited(mask, names, "not reached from outside when doors, windows and voids are shut", leak)
+    # The building's own box: the outermost cells hold the margin and are never rooms.
+    inner = (graph.cells[:, 0] > graph.cells[:, 0].min(axis=0)).all(axis=1)
+    inner &= (graph.cells[:, 1] < graph.cells[:, 1].max(axis=0)).all(axis=1)
+    reason = "the model names no rooms and the outside leaks into all of it: every cell that does not touch the margin"
+    return Inhabited(roomy & inner, names, reason, leak)
+
+
+def _rooms_of(scene: Scene, graph: CellGraph, roomy: np.ndarray) -> np.ndarray:
+    """Name of the room that holds more than half of each cell, "" elsewhere."""
+    share = np.zeros(graph.cell_count)
+    names = np.full(graph.cell_count, "", object)
+    steps = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    unit = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    for space in scene.spaces:
+        corners = space.vertices[space.faces] / scene.grid_m
+        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        near = np.flatnonzero(roomy & (graph.cells[:, 1] > low).all(axis=1) & (graph.cells[:, 0] < high).all(axis=1))
+        if not len(near):
+            continue
+        boxes = graph.cells[near].astype(float)
+        points = boxes[:, :1] + unit[None] * (boxes[:, 1:] - boxes[:, :1])
+        inside = np.abs(winding_numbers(points.reshape(-1, 3), corners)).reshape(points.shape[:2]) > 0.5
+        mine = inside.mean(axis=1)
+        better = mine > share[near]
+        share[near] += mine
+        names[near[better & (mine > 0)]] = space.name or "room"
+    names[share <= 0.5] = ""
+    return names
+
+
+def _flood(scene: Scene, graph: CellGraph) -> tuple[np.ndarray, list[int]]:
+    """Cells in components of room size that the outside does not reach, and a leak path if there is one."""
+    if graph.portal_count == 0:
+        return np.zeros(graph.cell_count, bool), []
+    shut = np.zeros(graph.portal_count, bool)
+    margin = SHUT_MARGIN_M / scene.grid_m
+    for low, high in scene.openings / scene.grid_m:
+        shut |= ((graph.portals[:, 0] >= low - margin) & (graph.portals[:, 1] <= high + margin)).all(axis=1)
+    a, b = graph.portal_cells[~shut].T
+    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(graph.cell_count, graph.cell_count)).tocsr()
+    _, component = connected_components(links, directed=False)
+    outside = int(np.argmin(graph.cells[:, 0].sum(axis=1)))
+    volume = np.prod((graph.cells[:, 1] - graph.cells[:, 0]) * scene.grid_m, axis=1)
+    big = np.bincount(component, volume) >= SMALLEST_ROOM_M3
+    enclosed = big[component] & (component != component[outside])
+    return enclosed, _leak_path(graph, links + links.T, outside, component)
+
+
+def _leak_path(graph: CellGraph, links: coo_matrix, outside: int, component: np.ndarray) -> list[int]:
+    """Cells from the outside to the middle of the building, if they are in one component."""
+    centre = (graph.cells.min(axis=(0, 1)).astype(float) + graph.cells.max(axis=(0, 1))) / 2
+    middle = int(np.abs(graph.cells.astype(float).mean(axis=1) - centre).sum(axis=1).argmin())
+    if component[middle] != component[outside]:
+        return []
+    _, before = breadth_first_order(links, outside, directed=False)
+    path = [middle]
+    while path[-1] != outside:
+        path.append(int(before[path[-1]]))
+    return path[::-1]
