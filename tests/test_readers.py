@@ -1,4 +1,3 @@
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -8,14 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.errors import InputError
 from viewcell.data.readers import read
-from viewcell.data.readers.roles import ifc_role, named_role
 from viewcell.data.readers.triangulate import polygon_triangles
 from viewcell.data.readers.units import metres_per_unit
 from viewcell.data.scene import GRID_M, Role, Scene
-from viewcell.data.scene_folder import read_scene, write_scene
+from viewcell.data.scene_folder import write_scene
 
-SHARED = Path(__file__).resolve().parents[2] / "shared" / "scenes"
-needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="no shared scenes folder beside the checkout")
 CUBE = trimesh.creation.box(bounds=[[5, 6, 7], [6, 8, 10]])  # away from its frame's origin
 
 
@@ -42,9 +38,6 @@ def refused(path, **options) -> str:
 
 
 SQUARE = "v 0 0 0\nv 4 0 0\nv 4 0 3\nv 0 0 3\n"
-
-
-# --- meshes -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("suffix", ["glb", "gltf", "obj", "ply", "stl"])
@@ -251,138 +244,3 @@ def test_star_shaped_polygons_keep_their_area(radii, axis, clockwise):
     signed = [area(flat[list(corners)]) for corners in triangles]
     assert min(signed) * max(signed) >= -1e-9  # none turned over, so none overlap
     assert sum(signed) == pytest.approx(area(flat))
-
-
-# --- IFC ----------------------------------------------------------------------------------------------------------
-
-INHERITANCE = {
-    "IfcWallStandardCase": Role.OCCLUDER,
-    "IfcSlabStandardCase": Role.OCCLUDER,
-    "IfcStairFlight": Role.OCCLUDER,
-    "IfcFooting": Role.OCCLUDER,
-    "IfcMember": Role.OCCLUDER,
-    "IfcPlate": Role.OCCLUDER,
-    "IfcBuildingElementProxy": Role.OCCLUDER,
-    "IfcDoorStandardCase": Role.TRANSPARENT,
-    "IfcWindowStandardCase": Role.TRANSPARENT,
-    "IfcCurtainWall": Role.TRANSPARENT,
-    "IfcFurniture": Role.DETAIL,
-    "IfcAirTerminal": Role.DETAIL,
-    "IfcSpaceHeater": Role.DETAIL,
-}
-
-
-@pytest.mark.parametrize("kind", INHERITANCE)
-def test_roles_follow_inheritance_not_exact_names(kind):
-    import ifcopenshell
-
-    entity = ifcopenshell.file(schema="IFC4").create_entity(kind)
-    assert ifc_role(entity.is_a, "", "open") is INHERITANCE[kind]
-    if kind != "IfcPlate":
-        assert named_role(f"1|{kind}|a", "", "open") == (INHERITANCE[kind], kind)
-
-
-def test_role_needs_more_than_the_class():
-    import ifcopenshell
-
-    file = ifcopenshell.file(schema="IFC4")
-    door, proxy, plate = (file.create_entity(kind) for kind in ("IfcDoor", "IfcBuildingElementProxy", "IfcPlate"))
-    assert ifc_role(door.is_a, "", "closed") is Role.OCCLUDER
-    assert ifc_role(proxy.is_a, "Office chair 12", "open") is Role.DETAIL
-    assert ifc_role(plate.is_a, "", "open", in_curtain_wall=True) is Role.TRANSPARENT
-
-
-IFC = {  # objects, spaces, openings, opaque rooms' worth of kinds that must be there
-    "threerooms_sb": (29, 4, 11, {"IfcWall": "occluder", "IfcFurniture": "detail", "IfcDoor": "transparent"}),
-    "kit_edc_sb": (264, 58, 143, {"IfcSlabStandardCase": "occluder", "IfcDoorStandardCase": "transparent"}),
-    "xbim_house_invalid": (134, 13, 45, {"IfcSlab": "occluder", "IfcWindow": "transparent"}),
-}
-IFC_SLOW = {
-    "ac11_institute_var2": (700, 82, 287, {"IfcFurnishingElement": "detail"}),
-    "ac20_fzk_haus": (83, 7, 17, {"IfcMember": "occluder"}),
-    "allplan_smiley_west": (391, 70, 140, {"IfcSlab": "occluder"}),
-    "duplex_A": (215, 21, 50, {"IfcStairFlight": "occluder", "IfcCovering": "occluder"}),
-    "jesse_nospaces": (626, 0, 149, {"IfcPlate": "transparent", "IfcMember": "occluder"}),
-    "office_A": (803, 99, 181, {"IfcFlowTerminal": "detail", "IfcCovering": "occluder"}),
-}
-MESHES = {
-    "engel_house/engel_house.obj": ({}, 1254, 15024),
-    "game_complex/complex.obj": ({"up": "y"}, 135, 12368),
-    "game_institute/institute.obj": ({"up": "y"}, 122, 35356),
-    "godot_room/room.glb": ({}, 17, 63720),
-    "ifc_clinic_arch/clinic_arch.obj": ({"up": "y"}, 2586, 169230),
-}
-
-
-def ifc_file(name: str) -> Path:
-    return next((SHARED / "ifc" / name).glob("*.ifc"))
-
-
-def check_ifc(name: str, expected: tuple, tmp_path: Path) -> None:
-    path = ifc_file(name)
-    before = path.read_bytes()
-    scene = read(path)
-    objects, spaces, openings, kinds = expected
-    assert (len(scene.objects), len(scene.spaces), len(scene.openings)) == (objects, spaces, openings)
-    found = Counter((placed.kind, placed.role.value) for placed in scene.objects)
-    assert kinds.items() <= dict(found.keys()).items()
-    assert scene.max_snap_m() <= GRID_M / 2
-    assert path.read_bytes() == before
-    write_scene(scene, tmp_path / name)
-    np.testing.assert_array_equal(read_scene(tmp_path / name).triangles()[0], scene.triangles()[0])
-
-
-@needs_shared
-@pytest.mark.parametrize("name", IFC)
-def test_shared_ifc(name, tmp_path):
-    check_ifc(name, IFC[name], tmp_path)
-
-
-@needs_shared
-@pytest.mark.slow
-@pytest.mark.parametrize("name", IFC_SLOW)
-def test_shared_ifc_slow(name, tmp_path):
-    check_ifc(name, IFC_SLOW[name], tmp_path)
-
-
-@needs_shared
-@pytest.mark.parametrize("name", MESHES)
-def test_shared_meshes(name):
-    options, objects, triangles = MESHES[name]
-    scene = read(SHARED / "mesh" / name, **options)
-    assert (len(scene.objects), len(scene.triangles()[0])) == (objects, triangles)
-
-
-@needs_shared
-def test_ifc_read_twice_is_the_same(monkeypatch):
-    path = ifc_file("threerooms_sb")
-    monkeypatch.setattr("os.cpu_count", lambda: 4)
-    many = read(path)
-    monkeypatch.setattr("os.cpu_count", lambda: 1)
-    one = read(path)
-    assert [placed.name for placed in many.objects] == [placed.name for placed in one.objects]
-    np.testing.assert_array_equal(many.triangles()[0], one.triangles()[0])
-
-
-@needs_shared
-def test_closed_doors_occlude_and_windows_do_not():
-    scene = read(ifc_file("threerooms_sb"), doors="closed")
-    roles = dict(by_name(scene).values())
-    assert roles["IfcDoor"] is Role.OCCLUDER and roles["IfcWindow"] is Role.TRANSPARENT
-
-
-@needs_shared
-def test_old_header_is_read_from_a_copy(tmp_path):
-    text = ifc_file("threerooms_sb").read_bytes().replace(b"FILE_SCHEMA(('IFC4'))", b"FILE_SCHEMA (('IFC2X_FINAL'))")
-    # An IFC4 body under an old header is not readable: what counts is that the header is not what stops it.
-    path = tmp_path / "old.ifc"
-    path.write_bytes(text)
-    assert "IFC2X_FINAL" not in refused(path)
-    assert path.read_bytes() == text
-
-
-@needs_shared
-def test_unknown_schema_is_refused(tmp_path):
-    text = ifc_file("threerooms_sb").read_bytes().replace(b"('IFC4')", b"('IFC9')")
-    (tmp_path / "new.ifc").write_bytes(text)
-    assert "IFC9" in refused(tmp_path / "new.ifc")

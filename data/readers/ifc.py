@@ -80,7 +80,7 @@ def _mend_stars(ifc: object, model: Model) -> None:
                 entity[i] = None
             mended += entity.is_a("IfcProduct")
     if mended:
-        model.skip(f"{mended} products", "names or other attributes given as * against the schema: left out")
+        model.skip(f"{mended} of the products", "names or other attributes given as * against the schema: left out")
 
 
 def _unit(ifc: object) -> str:
