@@ -25,8 +25,13 @@ COLOURS = {
 WALL, GLASS, PORTAL, OPENING, SIGHTLINE = "#222222", "#5fa8d3", "#d1495b", "#2a9d8f", "#023e8a"
 CELL_EDGE, NO_CELL = "#9aa5b1", "#d3d8de"
 SECTION_HEIGHT_M = 1.2
-# Floors further apart than this belong to different storeys.
-STOREY_GAP_M = 1.5
+# Storeys are at least so far apart, and have at least this share of the largest one's floor area.
+STOREY_GAP_M = 2.0
+SMALLEST_SHARE = 0.1
+# A floor this much lower than its storey's still belongs to it.
+STEP_M = 0.5
+# Shown around the inhabitable cells.
+MARGIN_M = 2.0
 LABELS_MOST = 60
 
 
@@ -67,19 +72,23 @@ class Section:
 
 
 def find_storeys(graph: CellGraph, grid_m: float) -> list[Storey]:
-    """Inhabitable cells grouped by the height of their floors, lowest first."""
+    """Inhabitable cells by storey, lowest first.
+
+    The floors with the largest areas, at least 2 m apart, are the storeys'; a cell (a stair step, a landing) belongs to
+    the highest storey whose floor is not above its own.
+    """
     cells = np.flatnonzero(graph.inhabitable)
-    floors = graph.cells[cells, 0, 2]
-    order = np.argsort(floors, kind="stable")
-    breaks = np.flatnonzero(np.diff(floors[order]) > STOREY_GAP_M / grid_m) + 1
-    storeys = []
-    for group in np.split(cells[order], breaks):
-        if len(group):
-            size = np.diff(graph.cells[group], axis=1)[:, 0].astype(np.float64)
-            heights, slot = np.unique(graph.cells[group, 0, 2], return_inverse=True)
-            areas = np.bincount(slot, weights=size[:, 0] * size[:, 1])
-            storeys.append(Storey(int(heights[areas.argmax()]), np.sort(group)))
-    return storeys
+    size = np.diff(graph.cells[cells], axis=1)[:, 0].astype(np.float64)
+    heights, slot = np.unique(graph.cells[cells, 0, 2], return_inverse=True)
+    areas = np.bincount(slot, weights=size[:, 0] * size[:, 1], minlength=len(heights))
+    floors: list[int] = []
+    for place in np.argsort(-areas, kind="stable"):
+        apart = all(abs(int(heights[place]) - floor) * grid_m >= STOREY_GAP_M for floor in floors)
+        if apart and areas[place] >= SMALLEST_SHARE * areas.max():
+            floors.append(int(heights[place]))
+    floors.sort()
+    level = np.searchsorted(np.array(floors), heights[slot] + STEP_M / grid_m, "right") - 1
+    return [Storey(floor, cells[np.maximum(level, 0) == number]) for number, floor in enumerate(floors)]
 
 
 def plan_of(storey: Storey, grid_m: float) -> Section:
@@ -126,7 +135,9 @@ class Painter:
         handles = [Patch(facecolor=COLOURS["inhabitable"], edgecolor=CELL_EDGE, label="inhabitable cell")]
         handles += [Patch(facecolor="white", edgecolor=CELL_EDGE, label="other cell"), *self._geometry_handles()]
         handles += [Line2D([], [], color=PORTAL, lw=2.2, label="portal")]
-        handles += [Patch(facecolor="none", edgecolor=OPENING, hatch="////", label="portal in floor or ceiling")]
+        handles += [
+            Patch(facecolor="none", edgecolor=OPENING, hatch="////", label="portal in a room's floor or ceiling")
+        ]
         _finish(figure, handles, path)
 
     def visible_set(
@@ -153,7 +164,7 @@ class Painter:
             lines = sightlines[:, :, cut.across] * self.grid_m
             faint = 0.9 if len(lines) < 30 else 0.45
             axes.add_collection(LineCollection(lines, colors=SIGHTLINE, linewidths=0.7, alpha=faint, zorder=4))
-            axes.plot(*lines[:, 0].T, ".", color=SIGHTLINE, markersize=2.5, zorder=5)
+            axes.plot(*lines[:, 0].T, ".", color=SIGHTLINE, markersize=1.5, zorder=5)
             height = cut.level * self.grid_m
             axes.set_title(f"{'plan' if cut.axis == 2 else 'elevation'}, cut at {names[cut.axis]} = {height:.2f} m")
         figure.suptitle(title)
@@ -171,19 +182,25 @@ class Painter:
         return handles + ([Line2D([], [], color=GLASS, lw=1.4, label="transparent")] if len(self._glass) else [])
 
     def _figure(self, sections: list[Section]) -> tuple[Figure, list[Axes]]:
-        """A figure whose panels share the model's proportions, one above the other."""
-        low, high = self.graph.cells[:, 0].min(axis=0) * self.grid_m, self.graph.cells[:, 1].max(axis=0) * self.grid_m
-        spans = [(high - low)[list(section.across)] for section in sections]
-        shares = [max(float(span[1] / span[0]), 0.12) for span in spans]
-        width = 12.0 if sum(shares) <= 1.2 else max(7.0, 14.4 / sum(shares))
-        size = (width, width * sum(shares) + 0.8 * len(sections) + 0.4)
-        figure = Figure(figsize=size, layout="constrained")
-        panels = figure.subplots(len(sections), 1, squeeze=False, height_ratios=shares)[:, 0]
+        """A figure with panels in the model's proportions: stacked if it is wide, side by side if it is deep."""
+        shown = self.graph.cells[self.graph.inhabitable] if self.graph.inhabitable.any() else self.graph.cells
+        low = shown[:, 0].min(axis=0) * self.grid_m - MARGIN_M
+        high = shown[:, 1].max(axis=0) * self.grid_m + MARGIN_M
+        spans = np.array([(high - low)[list(section.across)] for section in sections])
+        deep = spans[0, 1] > 1.2 * spans[0, 0]
+        whole = (spans[:, 0].sum(), spans[:, 1].max()) if deep else (spans[:, 0].max(), spans[:, 1].sum())
+        scale = min(14.0 / whole[0], 12.0 / whole[1])
+        figure = Figure(
+            figsize=(max(whole[0] * scale, 6.0) + 1.0, max(whole[1] * scale, 3.0) + 1.5), layout="constrained"
+        )
+        if deep:
+            panels = figure.subplots(1, len(sections), squeeze=False, width_ratios=spans[:, 0])[0]
+        else:
+            panels = figure.subplots(len(sections), 1, squeeze=False, height_ratios=spans[:, 1])[:, 0]
         for axes, section in zip(panels, sections, strict=True):
             u, v = section.across
-            margin = 0.02 * float(max(high - low))
-            axes.set(xlim=(low[u] - margin, high[u] + margin), ylim=(low[v] - margin, high[v] + margin))
             axes.set_facecolor(NO_CELL)
+            axes.set(xlim=(low[u], high[u]), ylim=(low[v], high[v]))
             axes.set(aspect="equal", xlabel=f"{'xyz'[u]} [m]", ylabel=f"{'xyz'[v]} [m]")
         return figure, list(panels)
 
@@ -206,13 +223,14 @@ class Painter:
         return Rectangle((low[u], low[v]), high[u] - low[u], high[v] - low[v])
 
     def _portals(self, axes: Axes, section: Section) -> None:
-        """Portals in walls as strokes, portals in the floors and ceilings of the cut cells as hatched rectangles."""
+        """Portals in walls as strokes, those in floors and ceilings of inhabitable cells as hatched rectangles."""
         boxes, upright = self.graph.portals, self.graph.portal_axis != section.axis
         u, v = section.across
         cut = boxes[upright & section.cuts(boxes)] * self.grid_m
         strokes = LineCollection(cut[:, :, [u, v]], colors=PORTAL, linewidths=1.8, zorder=5, capstyle="butt")
         axes.add_collection(strokes)
-        shown = section.cuts(self.graph.cells)[self.graph.portal_cells].any(axis=1) & ~upright
+        rooms = section.cuts(self.graph.cells) & self.graph.inhabitable
+        shown = rooms[self.graph.portal_cells].any(axis=1) & ~upright
         flat = [self._rectangle(box, section) for box in boxes[shown]]
         style = {"facecolor": "none", "edgecolor": OPENING, "hatch": "////", "linewidth": 0.5, "alpha": 0.45}
         axes.add_collection(PatchCollection(flat, match_original=False, zorder=2, **style))
@@ -237,4 +255,4 @@ def _finish(figure: Figure, handles: list, path: Path) -> None:
         frameon=False,
         fontsize=9,
     )
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=110, bbox_inches="tight")

@@ -115,7 +115,7 @@ class VerifyResult:
             ("rays a second", f"{self.rays_per_second:,.0f}{ratio}"),
             ("grazes", f"{self.grazes:,}"),
             ("leaks narrower than the seal", f"{self.leaks:,}"),
-            ("float hits missed, found exactly", f"{self.blocked:,}"),
+            ("candidate rays that the exact test stops", f"{self.blocked:,}"),
             ("inhabitable cells without a free point", f"{self.dark_cells:,}"),
             ("cell witnesses", witnesses[0]),
             ("object witnesses", witnesses[1]),
@@ -157,7 +157,7 @@ def verify(bake: "Bake", *, rays: int = 1_000_000, seed: int = 0, progress: bool
     start = time.perf_counter()
     _confirm_all(bake, judge, progress, result)
     result.seconds["witnesses"] = time.perf_counter() - start
-    result.counts = count_pairs(bake, caster)
+    result.counts = count_pairs(bake, caster if rays else None)
     return result
 
 

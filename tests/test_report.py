@@ -1,0 +1,132 @@
+"""Reports: what they say, and where the pictures put things."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from viewcell.data.errors import InputError
+from viewcell.data.graph import CellGraph
+from viewcell.verify.plans import COLOURS, Painter, Section, find_storeys, plan_of, section_lines
+from viewcell.workbench.report import choose_cells, report
+
+HOUSE = runpy.run_path(str(Path(__file__).with_name("small_house.py")))
+GRID = 2.0**-10
+
+
+@pytest.fixture
+def house(tmp_path):
+    return HOUSE["small_house"](tmp_path)
+
+
+def share_of(path, colour):
+    """Share of the picture's pixels that have a colour."""
+    picture = imread(path)[:, :, :3]
+    wanted = np.array([int(COLOURS[colour][i : i + 2], 16) / 255 for i in (1, 3, 5)])
+    return (np.abs(picture - wanted).max(axis=2) < 0.01).mean()
+
+
+def floors(*rooms):
+    """Graph of unconnected inhabitable rooms: (floor [m], side [m]) each."""
+    cells = [[[9 * n, 0, floor], [9 * n + side, side, floor + 2.5]] for n, (floor, side) in enumerate(rooms)]
+    count = len(rooms)
+    nothing = np.zeros((0, 2), np.int32), np.zeros(0, np.int8), np.zeros((0, 2, 3), np.int32)
+    names = np.full(count, "")
+    return CellGraph((np.array(cells) / GRID).astype(np.int32), np.ones(count, bool), names, *nothing)
+
+
+def test_report_of_the_house(house, tmp_path):
+    path = report(house, out=tmp_path / "looks")
+    text = path.read_text()
+    assert path == tmp_path / "looks" / "report.md"
+    assert "| cells, inhabitable | 14 | 14 | 1.000 | 0.00 % |" in text
+    assert "| opaque triangles | 216 |" in text and "| flood | 0.10 |" in text
+    pictures = [line.partition("](")[2].rstrip(")") for line in text.splitlines() if line.startswith("![")]
+    assert len(pictures) == 1 + len(choose_cells(house))
+    assert sorted([*pictures, "report.md"]) == sorted(p.name for p in path.parent.iterdir())
+
+
+def test_bare_graph_and_default_folder(tmp_path):
+    path = report(HOUSE["small_house"](tmp_path, bare=True), cells=[0])
+    assert path == tmp_path / "house" / "report" / "report.md"
+    assert "| objects | 0 |" in path.read_text()
+
+
+def test_colours_follow_the_verdicts(house, tmp_path):
+    report(house, cells=[0], out=tmp_path)
+    assert share_of(tmp_path / "cell-0.png", "unknown") < 0.01
+    before = share_of(tmp_path / "cell-0.png", "seen")
+    assert before > 0.05 and share_of(tmp_path / "cell-0.png", "source") > 0.02
+    rows = house.cell_to_cell.to_pylist()
+    for row in rows:
+        if row["cell_id"] == 0 and row["reached_cell_id"] == 4:
+            row.update(verdict="unknown", origin_x=None)
+    house.cell_to_cell = type(house.cell_to_cell).from_pylist(rows, schema=house.cell_to_cell.schema)
+    report(house, cells=[0], out=tmp_path)
+    assert share_of(tmp_path / "cell-0.png", "unknown") > 0.02
+    assert share_of(tmp_path / "cell-0.png", "seen") < 0.8 * before
+
+
+def test_sections_are_exact_outlines(house):
+    """At a height of 1 m the desk (60 to 66, 32 to 38 sixteenths) is gone; at 0.25 m its outline is a square."""
+    triangles, owners = house.scene.triangles()
+    desk = triangles[owners == 17]
+    assert len(section_lines(desk, Section(2, 1024.5))) == 0
+    lines = section_lines(desk, Section(2, 256.5))
+    assert len(lines) == 8
+    assert np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum() == pytest.approx(4 * 6 * 64)
+    assert lines.min(axis=(0, 1)).tolist() == [60 * 64, 32 * 64] and lines.max(axis=(0, 1)).tolist() == [
+        66 * 64,
+        38 * 64,
+    ]
+    elevation = section_lines(desk, Section(0, 63 * 64 + 0.5))
+    assert elevation.max(axis=(0, 1)).tolist() == [38 * 64, 8 * 64]
+
+
+def test_storeys_are_grouped_by_area():
+    """Stair steps between two floors make no storeys; a landing joins the storey below it."""
+    graph = floors((0.0, 8), (0.2, 4), (0.9, 1), (1.8, 1), (2.7, 1), (3.0, 7), (3.1, 3), (-2.9, 5))
+    storeys = find_storeys(graph, GRID)
+    assert [s.floor * GRID for s in storeys] == pytest.approx([-2.9, 0.0, 3.0], abs=GRID)
+    assert [s.cells.tolist() for s in storeys] == [[7], [0, 1, 2, 3], [4, 5, 6]]
+    assert plan_of(storeys[1], GRID).level * GRID == pytest.approx(1.2, abs=0.001)
+
+
+def test_nothing_inhabitable_gives_a_report_without_pictures(house, tmp_path):
+    house.graph.inhabitable[:] = False
+    house.cell_to_cell, house.potential_cells[:], house.potential_objects[:] = (
+        house.cell_to_cell.slice(0, 0),
+        False,
+        False,
+    )
+    house.cell_to_object = house.cell_to_object.slice(0, 0)
+    path = report(house, out=tmp_path / "r")
+    assert [p.name for p in path.parent.iterdir()] == ["report.md"]
+
+
+def test_chosen_cells_tell_something(house):
+    house.cell_to_cell = house.cell_to_cell.slice(3)
+    chosen = choose_cells(house)
+    assert "worst overestimate" in chosen[0]
+    assert any("largest set" in why for why in chosen.values()) and any("median" in why for why in chosen.values())
+
+
+@pytest.mark.parametrize("cell", [1, 7, -1])
+def test_unknown_cell_is_one_line(house, tmp_path, cell):
+    with pytest.raises(InputError, match=f"expected ids of inhabitable cells, found {cell}$"):
+        report(house, cells=[cell], out=tmp_path / "r")
+    assert not (tmp_path / "r").exists()
+
+
+def test_unwritable_folder_is_one_line(house, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"expected a folder to write the report to, found [^\n]*$"):
+        report(house, out=tmp_path / "file")
+
+
+def test_painter_cuts_what_the_section_meets(house):
+    painter = Painter(house.graph, house.scene, GRID)
+    section = Section(2, 21 * 64 + 0.5)
+    assert section.cuts(house.graph.cells).tolist() == [True, False, True, False, True, True, False]
+    assert painter.graph is house.graph and section.across == (0, 1) and Section(1, 0.5).across == (0, 2)
