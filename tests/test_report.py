@@ -85,11 +85,11 @@ def test_sections_are_exact_outlines(house):
 
 
 def test_storeys_are_grouped_by_area():
-    """Stair steps between two floors make no storeys; a landing joins the storey below it."""
-    graph = floors((0.0, 8), (0.2, 4), (0.9, 1), (1.8, 1), (2.7, 1), (3.0, 7), (3.1, 3), (-2.9, 5))
+    """Stair steps between two floors make no storeys; a landing or a platform joins the storey below it."""
+    graph = floors((0.0, 8), (0.2, 4), (0.9, 1), (1.8, 1), (2.7, 1), (3.0, 7), (3.1, 3), (-2.9, 5), (5.2, 1))
     storeys = find_storeys(graph, GRID)
     assert [s.floor * GRID for s in storeys] == pytest.approx([-2.9, 0.0, 3.0], abs=GRID)
-    assert [s.cells.tolist() for s in storeys] == [[7], [0, 1, 2, 3], [4, 5, 6]]
+    assert [s.cells.tolist() for s in storeys] == [[7], [0, 1, 2, 3], [4, 5, 6, 8]]
     assert plan_of(storeys[1], GRID).level * GRID == pytest.approx(1.2, abs=0.001)
 
 

@@ -232,7 +232,7 @@ def test_origins_and_aims(house):
     spots = cell_origins(house.graph, np.array([0, 2]), 100, lines, seed=1)
     assert len(spots[0]) == 100 and 80 < len(spots[1]) < 100
     assert lines.outside_solids(spots[1].astype(float)).all()
-    aims = aim_points(triangles, owners, house.graph.cells, seed=1)
+    aims = aim_points(triangles, owners, house.graph.cells, 30_000, seed=1)
     desk = house.scene.object_bounds()[17]
     assert ((aims >= desk[0]) & (aims <= desk[1])).all(axis=1).sum() > len(aims) / 2 / len(house.scene.objects) * 0.8
 

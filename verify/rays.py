@@ -20,7 +20,6 @@ from .walk import Links, Maze, Sightings, walk_rays
 # Of five rays three are stratified and two are aimed.
 CANDIDATE_CAPACITY = 4096
 ORIGINS_MOST = 256
-AIM_COUNT = 1 << 16
 # One ray in this many is also cast at the transparent triangles.
 GLASS_SHARE = 8
 
@@ -97,17 +96,18 @@ def cell_origins(graph: CellGraph, sources: np.ndarray, count: int, lines: Sight
     return result
 
 
-def aim_points(triangles: np.ndarray, owners: np.ndarray, cells: np.ndarray, seed: int) -> np.ndarray:
-    """Points to aim at [grid steps], shape (n, 3), float32: on objects (each as likely, by area within), and in cells.
+def aim_points(triangles: np.ndarray, owners: np.ndarray, cells: np.ndarray, count: int, seed: int) -> np.ndarray:
+    """Points to aim at [grid steps], shape (n, 3), float32: half on objects, each as likely, half in cells.
 
     Args:
         triangles: corners [grid steps], shape (m, 3, 3).
         owners: object of each, shape (m,), ascending.
         cells: boxes, shape (cells, 2, 3).
+        count: of points on objects, and of points in cells.
         seed: of the draw.
     """
     rng = np.random.default_rng(seed)
-    boxes = cells[rng.integers(0, len(cells), AIM_COUNT // 2)].astype(np.float64)
+    boxes = cells[rng.integers(0, len(cells), count)].astype(np.float64)
     inside = boxes[:, 0] + rng.random((len(boxes), 3)) * (boxes[:, 1] - boxes[:, 0])
     if not len(triangles):
         return inside.astype(np.float32)
@@ -116,7 +116,7 @@ def aim_points(triangles: np.ndarray, owners: np.ndarray, cells: np.ndarray, see
     total = np.concatenate([[0.0], np.cumsum(area)])
     objects, start = np.unique(owners, return_index=True)
     bounds = np.concatenate([total[start], total[-1:]])
-    drawn = rng.integers(0, len(objects), AIM_COUNT // 2)
+    drawn = rng.integers(0, len(objects), count)
     place = bounds[drawn] + rng.random(len(drawn)) * (bounds[drawn + 1] - bounds[drawn])
     chosen = corners[np.clip(np.searchsorted(total, place, "right") - 1, 0, len(corners) - 1)]
     weights = rng.dirichlet((1.0, 1.0, 1.0), len(drawn))

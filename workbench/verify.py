@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from ..data.database import Bake
 
 BATCH_RAYS = 100_000
+# Points to aim at: fewest and most; many rays share one, from different origins.
+AIMS = (1 << 13, 1 << 20)
 THREADS = 2
 KINDS = ("cell", "object")
 
@@ -242,7 +244,7 @@ def _make_caster(
     caster = Caster(
         sources=sources,
         spots=[own for own in spots if len(own)],
-        aims=aim_points(lines.triangles, lines.owners, bake.graph.cells, seed),
+        aims=aim_points(lines.triangles, lines.owners, bake.graph.cells, int(np.clip(rays // 32, *AIMS)), seed),
         boxes=bake.graph.cells,
         links=links,
         potential_cells=bake.potential_cells[sources],
