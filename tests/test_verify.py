@@ -21,7 +21,7 @@ from viewcell.workbench.verify import make_judge, replay, verify
 HOUSE = runpy.run_path(str(Path(__file__).with_name("small_house.py")))
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 GRID = 2.0**-10
-RAYS = 20_000
+RAYS = 100_000
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 BATCH_RAYS = 100_000
 # Points to aim at: fewest and most; many rays share one, from different origins.
-AIMS = (1 << 13, 1 << 20)
+AIMS = (1 << 14, 1 << 20)
 THREADS = 2
 KINDS = ("cell", "object")
 
