@@ -2,12 +2,15 @@
 
 from fractions import Fraction
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.errors import InputError
+from viewcell.data.readers import read
+from viewcell.verify.rays import embree_scene
 from viewcell.verify.sightline import Sight, Sightlines, closed_objects
 
 OCTANTS = list(product((1, -1), repeat=3))
@@ -158,6 +161,28 @@ def test_nothing_blocks_where_there_is_nothing():
     assert empty.check(np.zeros((2, 3)), np.ones((2, 3))).tolist() == [Sight.CLEAR] * 2
     assert empty.outside_solids(np.zeros((2, 3))).all()
     assert Sightlines(UNIT[None]).check(np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
+
+
+@pytest.mark.slow
+def test_agrees_with_embree_on_a_real_building():
+    """Short of Embree's hit a sightline is clear, past it it is not; but for hits that robust mode misses."""
+    model = Path(__file__).resolve().parents[2] / "shared" / "scenes" / "mesh" / "ifc_clinic_arch" / "clinic_arch.obj"
+    if not model.exists():
+        pytest.skip("no shared scenes folder with the clinic")
+    triangles = read(model).triangles()[0]
+    rng = np.random.default_rng(11)
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    origins = rng.uniform(low, high, (50_000, 3)).astype(np.float32)
+    directions = rng.normal(size=origins.shape)
+    directions = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).astype(np.float32)
+    found = embree_scene(triangles).run(origins, directions, output=1)
+    hit = (found["primID"] >= 0) & (found["tfar"] > 10)
+    starts, reach = origins[hit].astype(float), found["tfar"][hit, None].astype(float)
+    lines = Sightlines(triangles)
+    short, past = (lines.check(starts, starts + directions[hit] * (reach + by)) for by in (-0.5, 0.5))
+    assert hit.sum() > 20_000
+    assert np.count_nonzero(short) < 1e-4 * len(starts)
+    assert np.count_nonzero(past == Sight.CLEAR) < 1e-4 * len(starts)
 
 
 @pytest.mark.parametrize(
