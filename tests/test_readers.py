@@ -212,6 +212,15 @@ def test_garbage_is_one_clear_line(tmp_path, suffix, content):
     refused(tmp_path / f"a.{suffix}")
 
 
+def test_truncated_files_are_one_clear_line(tmp_path):
+    for suffix in ("glb", "stl", "ply"):
+        path = tmp_path / f"a.{suffix}"
+        path.write_bytes(CUBE.export(file_type=suffix)[:300])
+        assert "module" not in refused(path)
+    (tmp_path / "a.gltf").write_bytes(trimesh.Scene(CUBE).export(file_type="gltf")["model.gltf"])
+    refused(tmp_path / "a.gltf")  # its buffer is not beside it
+
+
 def test_unusable_arguments(tmp_path):
     path = write(tmp_path / "a.obj", SQUARE + "f 1 2 3\n")
     assert "nothing" in refused(tmp_path / "b.obj")

@@ -42,6 +42,8 @@ def read_mesh(path: Path, model: Model, *, up: str | None, unit: str | float | N
             take(path, model, to_model, doors)
     except (InputError, MemoryError):
         raise
+    except (ImportError, UnicodeError):  # trimesh then wants a package to guess the encoding, which is no help here
+        raise InputError(f"{path}: expected a whole binary file or UTF-8 text, found neither") from None
     except Exception as error:  # the loaders raise whatever their parsing trips over
         found = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path}: expected a readable {path.suffix} file, found {found}") from None
