@@ -165,7 +165,7 @@ def small_house(folder: Path, bare: bool = False) -> StandIn:
             table[pair] = True
     names = ["cell_id", "object_id", "verdict", *(f"{v}_{a}" for v in ("origin", "direction") for a in AXES)]
     types = [pa.int32(), pa.int32(), pa.string(), *[pa.float64()] * 6]
-    manifest = {"model": "small house", "settings": {"seal": 0.0}, "seconds": {"flood": 0.1}}
+    manifest = {"source": "small house", "settings": {"seal": 0.0}, "seconds": {"flood": 0.1}}
     return StandIn(
         scene, graph, grid_m, np.zeros(3), manifest,
         folder / "house", pa.Table.from_pylist(list(pairs.values())),

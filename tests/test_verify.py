@@ -12,8 +12,8 @@ import pytest
 from viewcell.data.errors import InputError
 from viewcell.data.graph import OTHER_AXES, CellGraph
 from viewcell.verify.adjudicate import Judgement
+from viewcell.verify.aims import aim_points, cell_origins, frontier_points
 from viewcell.verify.casefile import WrongHidden, load_cases, read_case, write_case
-from viewcell.verify.rays import aim_points, cell_origins
 from viewcell.verify.sightline import Sightlines
 from viewcell.verify.walk import contact_links, portal_links
 from viewcell.workbench.verify import make_judge, replay, verify
@@ -232,9 +232,19 @@ def test_origins_and_aims(house):
     spots = cell_origins(house.graph, np.array([0, 2]), 100, lines, seed=1)
     assert len(spots[0]) == 100 and 80 < len(spots[1]) < 100
     assert lines.outside_solids(spots[1].astype(float)).all()
-    aims = aim_points(triangles, owners, house.graph.cells, 30_000, seed=1)
+    aims = aim_points(triangles, owners, 30_000, seed=1)
     desk = house.scene.object_bounds()[17]
-    assert ((aims >= desk[0]) & (aims <= desk[1])).all(axis=1).sum() > len(aims) / 2 / len(house.scene.objects) * 0.8
+    assert ((aims >= desk[0]) & (aims <= desk[1])).all(axis=1).sum() > len(aims) / len(house.scene.objects) * 0.8
+
+
+def test_frontier_is_hidden_and_beside_the_set(house):
+    potential = np.zeros((2, 7), bool)
+    potential[0, [0, 1]] = True
+    potential[1] = True
+    points = frontier_points(contact_links(house.graph.cells), house.graph.cells, potential, 50, seed=1)
+    low, high = house.graph.cells[2]
+    assert ((points[0] >= low) & (points[0] <= high)).all()
+    assert points.shape == (2, 50, 3) and points[1, :, 0].min() < 2560 < points[1, :, 0].max()
 
 
 def test_a_cell_inside_a_solid_has_no_rays(house):

@@ -13,13 +13,11 @@ import warp as wp
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
-from ..data.graph import CellGraph
-from .sightline import Sightlines
+from .aims import ORIGINS_MOST
 from .walk import Links, Maze, Sightings, walk_rays
 
-# Of five rays three are stratified and two are aimed.
 CANDIDATE_CAPACITY = 4096
-ORIGINS_MOST = 256
+ORIGINS = wp.constant(ORIGINS_MOST)
 # One ray in this many is also cast at the transparent triangles.
 GLASS_SHARE = 8
 
@@ -27,9 +25,11 @@ GLASS_SHARE = 8
 @wp.kernel
 def aim_rays(
     seed: int, first: int, spots: wp.array3d[float], spot_counts: wp.array[int], aims: wp.array2d[float],
-    origins_out: wp.array2d[float], directions_out: wp.array2d[float],
+    frontier: wp.array3d[float], origins_out: wp.array2d[float], directions_out: wp.array2d[float],
 ):  # fmt: skip
     """Rays `first` and following of every row: origins in turn, directions from a shifted lattice or at an aim.
+
+    Of five rays three are stratified, one is aimed at an object and one just beyond the potentially visible set.
 
     The lattice is Roberts' R2 sequence, mapped to the sphere by equal areas, shifted at random for every origin.
     """
@@ -44,11 +44,13 @@ def aim_rays(
     # One stream a ray for its aim, one an origin for the shift of its lattice.
     state = wp.rand_init(seed, row * 1048573 + number)
     d = wp.vec3()
-    aimed = turn % 5 > 2 and aims.shape[0] > 0
-    if aimed:
+    if turn % 5 == 3 and aims.shape[0] > 0:
         aim = wp.randi(state, 0, aims.shape[0])
         d = wp.normalize(wp.vec3(aims[aim, 0], aims[aim, 1], aims[aim, 2]) - o)
-    if not aimed or wp.length(d) < 0.5:
+    if turn % 5 == 4 and frontier.shape[1] > 0:
+        aim = wp.randi(state, 0, frontier.shape[1])
+        d = wp.normalize(wp.vec3(frontier[row, aim, 0], frontier[row, aim, 1], frontier[row, aim, 2]) - o)
+    if wp.length(d) < 0.5:
         shift = wp.rand_init(seed + 1, row * ORIGINS + spot)
         # R2's two steps as 32-bit fractions: the wrap-around is the lattice's modulo.
         u = wp.randu(shift) + wp.uint32(turn) * wp.uint32(3242174889)
@@ -60,67 +62,6 @@ def aim_rays(
     for axis in range(3):
         origins_out[ray, axis] = o[axis]
         directions_out[ray, axis] = d[axis]
-
-
-ORIGINS = wp.constant(ORIGINS_MOST)
-
-
-def cell_origins(graph: CellGraph, sources: np.ndarray, count: int, lines: Sightlines, seed: int) -> list[np.ndarray]:
-    """Points strictly inside each source cell and outside every solid, spread evenly.
-
-    Args:
-        graph: cells.
-        sources: cell ids, shape (rows,).
-        count: points wanted a cell, at most 256; a cell that is mostly solid gets fewer, possibly none.
-        lines: the opaque triangles, for the exact test.
-        seed: of the random shift of each cell's lattice (Roberts' R3 sequence).
-
-    Returns:
-        For each source an array of shape (k, 3) [grid steps], float32 (exact as float64), k <= count.
-    """
-    rng = np.random.default_rng(seed)
-    steps = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
-    boxes = graph.cells[sources].astype(np.float64)
-    result = [np.zeros((0, 3), np.float32) for _ in sources]
-    for trial, wanted in ((0, count), (1, 8 * count)):
-        rows = [row for row, found in enumerate(result) if not len(found)]
-        if not rows or (trial and not lines.closed_owners.size):
-            break
-        places = (rng.random((len(rows), 1, 3)) + np.arange(1, wanted + 1)[None, :, None] * steps) % 1.0
-        points = (boxes[rows, None, 0] + places * (boxes[rows, None, 1] - boxes[rows, None, 0])).astype(np.float32)
-        exact = points.astype(np.float64)
-        good = ((exact > boxes[rows, None, 0]) & (exact < boxes[rows, None, 1])).all(axis=2)
-        good[good] = lines.outside_solids(exact[good])
-        for row, own, keep in zip(rows, points, good, strict=True):
-            result[row] = own[keep][:count]
-    return result
-
-
-def aim_points(triangles: np.ndarray, owners: np.ndarray, cells: np.ndarray, count: int, seed: int) -> np.ndarray:
-    """Points to aim at [grid steps], shape (n, 3), float32: half on objects, each as likely, half in cells.
-
-    Args:
-        triangles: corners [grid steps], shape (m, 3, 3).
-        owners: object of each, shape (m,), ascending.
-        cells: boxes, shape (cells, 2, 3).
-        count: of points on objects, and of points in cells.
-        seed: of the draw.
-    """
-    rng = np.random.default_rng(seed)
-    boxes = cells[rng.integers(0, len(cells), count)].astype(np.float64)
-    inside = boxes[:, 0] + rng.random((len(boxes), 3)) * (boxes[:, 1] - boxes[:, 0])
-    if not len(triangles):
-        return inside.astype(np.float32)
-    corners = triangles.astype(np.float64)
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    total = np.concatenate([[0.0], np.cumsum(area)])
-    objects, start = np.unique(owners, return_index=True)
-    bounds = np.concatenate([total[start], total[-1:]])
-    drawn = rng.integers(0, len(objects), count)
-    place = bounds[drawn] + rng.random(len(drawn)) * (bounds[drawn + 1] - bounds[drawn])
-    chosen = corners[np.clip(np.searchsorted(total, place, "right") - 1, 0, len(corners) - 1)]
-    weights = rng.dirichlet((1.0, 1.0, 1.0), len(drawn))
-    return np.concatenate([inside, np.einsum("nc,nca->na", weights, chosen)]).astype(np.float32)
 
 
 @dataclass
@@ -151,7 +92,8 @@ class Caster:
     Attributes:
         sources: cell id of each row, shape (rows,), int32.
         spots: origins of each row, ragged.
-        aims: points to aim at, shape (n, 3), float32.
+        aims: points on objects, shape (n, 3), float32.
+        frontier: points beyond each row's potentially visible set, shape (rows, n, 3), float32.
         boxes: all cells [grid steps], shape (cells, 2, 3).
         links: ways between the cells.
         potential_cells: shape (rows, cells), bool.
@@ -164,6 +106,7 @@ class Caster:
     sources: np.ndarray
     spots: list[np.ndarray]
     aims: np.ndarray
+    frontier: np.ndarray
     boxes: np.ndarray
     links: Links
     potential_cells: np.ndarray
@@ -184,7 +127,8 @@ class Caster:
         spots = np.zeros((len(self.spots), max(map(len, self.spots)), 3), np.float32)
         for row, own in enumerate(self.spots):
             spots[row, : len(own)] = own
-        self._aim = (_share(spots), _share(np.array([len(own) for own in self.spots], np.int32)), _share(self.aims))
+        self._aim = (_share(spots), _share(np.array([len(own) for own in self.spots], np.int32)))
+        self._aim += (_share(self.aims), _share(self.frontier))
         self._maze, self._marks = Maze(), Sightings()
         self._maze.boxes = _share(self.boxes.reshape(-1, 6).astype(np.float64))
         for name in ("starts", "cells", "rectangles", "portals"):

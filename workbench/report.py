@@ -9,9 +9,9 @@ import numpy as np
 
 from ..data.errors import InputError
 from ..data.scene import Role
+from ..verify.findings import count_pairs
 from ..verify.plans import Painter, Section, Storey, find_storeys, plan_of
 from ..verify.witness import read_witnesses, visible_rows
-from .verify import count_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,8 +81,7 @@ def _seen_counts(bake: "Bake") -> np.ndarray:
 
 def _write(bake: "Bake", chosen: dict[int, str], folder: Path) -> None:
     painter, storeys = Painter(bake.graph, bake.scene, bake.grid_m), find_storeys(bake.graph, bake.grid_m)
-    model = bake.manifest.get("model", "")
-    name = Path(str(model.get("path", "") if isinstance(model, dict) else model)).name or Path(bake.folder).name
+    name = Path(str(bake.manifest.get("source", ""))).name or Path(bake.folder).name
     lines = [f"# {name}", "", *_numbers(bake), "", "## Storeys", ""]
     for number, storey in enumerate(storeys):
         title = f"Storey {number}: floor at {storey.floor * bake.grid_m:.2f} m, {len(storey.cells)} inhabitable cells"
@@ -137,7 +136,7 @@ def _numbers(bake: "Bake") -> list[str]:
         "|---|---|---|---|---|",
     ]
     for c in count_pairs(bake):
-        lines.append(f"| {c.name} | {c.potential:,} | {c.seen:,} | {c.overestimate:.3f} | {c.unknown_percent:.2f} % |")
+        lines.append(f"| {c.name} | {' | '.join(c.columns())} |")
     seconds = {k: v for k, v in bake.manifest.get("seconds", {}).items() if isinstance(v, int | float)}
     if seconds:
         lines += ["", "| phase | seconds |", "|---|---|", *(f"| {k} | {v:.2f} |" for k, v in seconds.items())]

@@ -1,0 +1,140 @@
+"""What a check of a bake found, and how its pairs are counted."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .rays import Caster
+from .witness import Confirmed, visible_rows
+
+if TYPE_CHECKING:
+    from ..data.database import Bake
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Pairs (inhabitable source, target) of one class of targets.
+
+    Attributes:
+        name: of the class.
+        potential: pairs not proved hidden.
+        seen: pairs with a stored witness.
+        by_rays: potential pairs that this run's rays saw.
+    """
+
+    name: str
+    potential: int
+    seen: int
+    by_rays: int
+
+    @property
+    def overestimate(self) -> float:
+        """Potential pairs over seen pairs: an upper bound of the true ratio."""
+        return self.potential / self.seen if self.seen else float("inf") if self.potential else 1.0
+
+    @property
+    def unknown_percent(self) -> float:
+        """Share of the potential pairs that has no witness [%]."""
+        return 100.0 * (self.potential - self.seen) / self.potential if self.potential else 0.0
+
+    def columns(self) -> tuple[str, str, str, str]:
+        """Potential, seen, overestimate and unknown as they are printed."""
+        ratio = f"{self.overestimate:.3f}" if self.seen or not self.potential else "no witness"
+        return f"{self.potential:,}", f"{self.seen:,}", ratio, f"{self.unknown_percent:.2f} %"
+
+
+@dataclass
+class VerifyResult:
+    """What `verify` found.
+
+    Attributes:
+        rays: cast.
+        rays_per_second: while casting, walking and judging; compiling and building excluded.
+        embree_rate: Embree alone on the same rays and threads; 0 for a bare graph, which has no triangles.
+        wrong_hidden: hidden pairs that an exactly adjudicated sightline shows; the run stops at the first.
+        case: the case file written for it.
+        grazes: candidate rays that only touch an edge, a vertex or a boundary.
+        leaks: candidate rays through gaps narrower than the bake's seal.
+        blocked: candidate rays that the exact test stops: Embree had missed a triangle.
+        dark_cells: inhabitable cells in which no point outside all solids was found, so no ray starts there.
+        counts: table of pairs.
+        cell_witnesses: outcome of every stored cell-to-cell witness.
+        object_witnesses: the same for cell-to-object.
+        seconds: by phase.
+    """
+
+    rays: int = 0
+    rays_per_second: float = 0.0
+    embree_rate: float = 0.0
+    wrong_hidden: int = 0
+    case: Path | None = None
+    grazes: int = 0
+    leaks: int = 0
+    blocked: int = 0
+    dark_cells: int = 0
+    counts: list[Counts] = field(default_factory=list)
+    cell_witnesses: Confirmed = field(default_factory=Confirmed)
+    object_witnesses: Confirmed = field(default_factory=Confirmed)
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def refuted(self) -> int:
+        """Stored witnesses that do not hold."""
+        return self.cell_witnesses.refuted + self.object_witnesses.refuted
+
+    @property
+    def ok(self) -> bool:
+        """Nothing forbidden was found."""
+        return self.wrong_hidden == 0 and self.refuted == 0
+
+    @property
+    def rate_ratio(self) -> float:
+        """Rays a second over Embree's own; 0 for a bare graph."""
+        return self.rays_per_second / self.embree_rate if self.embree_rate else 0.0
+
+    def table(self) -> str:
+        """The result as two Markdown tables."""
+        ratio = f" ({self.rate_ratio:.0%} of Embree's own)" if self.embree_rate else ""
+        witnesses = [
+            f"{found.confirmed:,} confirmed, {found.refuted:,} refuted"
+            for found in (self.cell_witnesses, self.object_witnesses)
+        ]
+        rows = [
+            ("wrong-hidden", f"{self.wrong_hidden}" + (f" (case file {self.case})" if self.case else "")),
+            ("rays", f"{self.rays:,}"),
+            ("rays a second", f"{self.rays_per_second:,.0f}{ratio}"),
+            ("grazes", f"{self.grazes:,}"),
+            ("leaks narrower than the seal", f"{self.leaks:,}"),
+            ("candidate rays that the exact test stops", f"{self.blocked:,}"),
+            ("inhabitable cells without a free point", f"{self.dark_cells:,}"),
+            ("cell witnesses", witnesses[0]),
+            ("object witnesses", witnesses[1]),
+            ("seconds", ", ".join(f"{name} {value:.1f}" for name, value in self.seconds.items())),
+        ]
+        lines = ["| check | result |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows), ""]
+        lines += ["| targets | potential | seen | overestimate | unknown | seen by rays |", "|---|---|---|---|---|---|"]
+        for c in self.counts:
+            lines.append(f"| {c.name} | {' | '.join(c.columns())} | {c.by_rays:,} |")
+        refuted = [*self.cell_witnesses.examples, *self.object_witnesses.examples]
+        return "\n".join([*lines, *(["", *(f"refuted: {line}" for line in refuted)] if refuted else [])])
+
+
+def count_pairs(bake: "Bake", caster: Caster | None = None) -> list[Counts]:
+    """Pairs by class of targets: inhabitable cells, all cells, objects; with what a caster's rays saw, if given."""
+    inhabitable = bake.graph.inhabitable
+    tables = [
+        ("cells, inhabitable", bake.potential_cells[:, inhabitable], bake.cell_to_cell, "reached_cell_id", inhabitable),
+        ("cells, all", bake.potential_cells, bake.cell_to_cell, "reached_cell_id", None),
+        ("objects", bake.potential_objects, bake.cell_to_object, "object_id", None),
+    ]
+    counts = []
+    for name, potential, table, target, chosen in tables:
+        ids = visible_rows(table)[target].to_numpy()
+        seen = len(ids) if chosen is None else int(chosen[ids].sum())
+        by_rays = 0
+        if caster is not None:
+            marks = caster.seen_objects if target == "object_id" else caster.seen_cells
+            own = caster.potential_objects if target == "object_id" else caster.potential_cells
+            by_rays = int(((marks > 0) & own)[:, slice(None) if chosen is None else chosen].sum())
+        counts.append(Counts(name, int(potential.sum()), seen, by_rays))
+    return counts
