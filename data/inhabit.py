@@ -1,7 +1,8 @@
 """Inhabitable cells: where an observer may stand, and why.
 
 By rooms (IfcSpace) where the model names them. Else by flooding: doors, windows and voids are shut, and what the
-outside does not reach is a room. Where neither works the reason is reported with the path by which the outside leaks in.
+outside does not reach is a room. Where neither works the reason is reported with the path by which the outside leaks
+in.
 """
 
 from dataclasses import dataclass, field

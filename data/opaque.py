@@ -1,9 +1,9 @@
 """Opaque axial rectangles of a model, exactly, on the integer grid.
 
 Per plane, all axial triangles are turned to one orientation, so the winding number of a point is the number of
-triangles that cover it, whatever overlaps, doubles or T-junctions there are. Shared edges cancel; the rest is rastered on its own
-compressed coordinates. A raster cell that an oblique outline crosses is dropped: the result is a subset of the true
-surface, so nothing is ever called blocked that is not.
+triangles that cover it, whatever overlaps, doubles or T-junctions there are. Shared edges cancel; the rest is rastered
+on its own compressed coordinates. A raster cell that an oblique outline crosses is dropped: the result is a subset of
+the true surface, so nothing is ever called blocked that is not.
 """
 
 from dataclasses import dataclass

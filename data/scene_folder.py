@@ -135,7 +135,7 @@ def new_folder(folder: str | Path, kind: str) -> Iterator[Path]:
         InputError: `folder` is there but no folder of this kind, or writing failed (a full disk, no permission).
     """
     folder = Path(folder)
-    if folder.exists() and not _replaceable(folder, kind):
+    if folder.exists() and not replaceable(folder, kind):
         raise InputError(f"{folder}: expected a new name or a {kind} folder to replace, found something else there")
     temporary = None
     try:
@@ -161,7 +161,8 @@ def _replace(temporary: Path, folder: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def _replaceable(folder: Path, kind: str) -> bool:
+def replaceable(folder: Path, kind: str) -> bool:
+    """Whether a folder may be replaced: it is of this kind, or empty."""
     if not folder.is_dir():
         return False
     try:

@@ -111,3 +111,38 @@ def dead_cells(cells: np.ndarray, solids: list[tuple[int, np.ndarray]]) -> np.nd
         touched[which[triangles_meet_boxes(triangles[t], boxes[which])]] = True
         dead[near[~touched]] = True
     return dead
+
+
+class SolidIndex:
+    """Closed solids by the cell that they reach into, to tell whether a sightline starts outside all of them."""
+
+    def __init__(self, cells: np.ndarray, solids: list[tuple[int, np.ndarray]]) -> None:
+        """Find which solids overlap which open cell.
+
+        Args:
+            cells: [grid steps], shape (n, 2, 3), int32.
+            solids: as from `closed_elements`.
+        """
+        self._solids = [triangles for _, triangles in solids]
+        self._boxes = np.array([[t.min(axis=(0, 1)), t.max(axis=(0, 1))] for t in self._solids]).reshape(-1, 2, 3)
+        self._cells = cells
+
+    def outside(self, points: np.ndarray, cell: int) -> np.ndarray:
+        """Points of one cell that certainly lie outside every solid.
+
+        Args:
+            points: [grid steps], shape (n, 3), float64, inside the open cell.
+            cell: the cell that holds them.
+
+        Returns:
+            Shape (n,), bool. True is safe; False may lie on a surface or in a doubtful place.
+        """
+        low, high = self._cells[cell]
+        near = np.flatnonzero((self._boxes[:, 0] < high).all(axis=1) & (self._boxes[:, 1] > low).all(axis=1))
+        free = np.ones(len(points), bool)
+        for solid in near:
+            boxed = free & (points >= self._boxes[solid, 0]).all(axis=1) & (points <= self._boxes[solid, 1]).all(axis=1)
+            held = np.flatnonzero(boxed)
+            if len(held):
+                free[held] = np.abs(winding_numbers(points[held], self._solids[solid])) < 1e-3
+        return free

@@ -5,9 +5,13 @@ fixed before the search, a child first tries its parent's direction (six compari
 says so, so that what it did not reach is UNKNOWN, never HIDDEN.
 """
 
+from dataclasses import dataclass
+
+import numpy as np
 import warp as wp
 
 from .graph import DeviceGraph, reflect_high, reflect_low
+from .launch import SlotSizes, run_sliced
 from .stab import (
     AT_M,
     AT_W,
@@ -181,3 +185,82 @@ def _flood(
                             store_counts(frames, down, grown)
         tests_out[row, octant] = tests
         row += slots
+
+
+# Sources a launch: what they find is collected after each, so a launch's room is this times the number of cells.
+CHUNK = 64
+
+
+@dataclass
+class FloodAnswers:
+    """What a flood found.
+
+    Attributes:
+        pairs: (row of the source, reached cell, octant), shape (n, 3), int32, sorted; one row for the first octant that
+            stabbed the pair.
+        line: w of each pair's line, float64, shape (n, 3), as in `TargetAnswers`.
+        offset: its xi.
+        undecided: (row, cell) pairs that only a line too thin to decide reaches, shape (sources, cells), bool.
+        complete: rows of sources whose search ended before its cap: what they did not reach is hidden, exactly.
+        tests: stabbing decisions.
+    """
+
+    pairs: np.ndarray
+    line: np.ndarray
+    offset: np.ndarray
+    undecided: np.ndarray
+    complete: np.ndarray
+    tests: int
+
+
+def launch_flood(
+    graph: DeviceGraph,
+    sources: np.ndarray,
+    octants: tuple[int, ...] = tuple(range(8)),
+    *,
+    cap: int,
+    threads: int = 1,
+    device: str = "cpu",
+) -> FloodAnswers:
+    """Flood from every source, octant by octant.
+
+    Args:
+        graph: on the same device.
+        sources: cells, shape (n,), int.
+        octants: directions searched; four that all keep one sign suffice when every cell is a source, because a
+            sightline can be followed either way.
+        cap: stabbing decisions a source and octant.
+        threads: CPU threads.
+        device: Warp device.
+    """
+    count, cells = len(sources), graph.cell_lo.shape[0]
+    source = wp.array(np.ascontiguousarray(sources, np.int32), dtype=int, device=device)
+    reached = wp.zeros((count, cells), dtype=wp.uint8, device=device)
+    tests = wp.zeros((count, 8), dtype=int, device=device)
+    gathered: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+
+    def launch(first: int, last: int, slots: int, scratch: wp.array, frames: wp.array) -> None:
+        room = (last - first) * cells
+        found = Found()
+        found.count = wp.zeros(1, dtype=int, device=device)
+        found.pair = wp.empty(room, dtype=wp.vec3i, device=device)
+        found.line, found.offset = (wp.empty(room, dtype=wp.vec3d, device=device) for _ in range(2))
+        for octant in octants:
+            inputs = [graph, source, first, last, octant, cap, scratch, frames, reached, tests, found]
+            wp.launch(_flood, dim=slots, inputs=inputs, device=device)
+        used = int(found.count.numpy()[0])
+        gathered.append(tuple(x[:used].numpy().copy() for x in (found.pair, found.line, found.offset)))
+
+    sizes = SlotSizes(int(SLOT_SIZE), (int(MAX_DEPTH) + 1) * int(FRAME))
+    run_sliced(launch, count, sizes, module=__name__, threads=threads, device=device, chunk=CHUNK)
+    pairs, line, offset = (np.concatenate(column) for column in zip(*gathered, strict=True))
+    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    spent = tests.numpy()[:, list(octants)]
+    return FloodAnswers(
+        pairs[order],
+        line[order],
+        offset[order],
+        reached.numpy() == int(UNDECIDED),
+        (spent >= 0).all(axis=1),
+        int(np.maximum(spent, 0).sum()),
+    )

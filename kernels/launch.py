@@ -42,6 +42,7 @@ def run_sliced(
     module: str,
     threads: int = 1,
     device: str = "cpu",
+    chunk: int = CHUNK,
 ) -> None:
     """Call `launch(first, last, slots, scratch, frames)` until all items are done.
 
@@ -54,21 +55,21 @@ def run_sliced(
     wp.load_module(module, device=device)
     if not wp.get_device(device).is_cpu:
         slots = min(count, GPU_SLOTS)
-        launch(0, count, slots, *_scratch(sizes, slots, device))
+        launch(0, count, slots, *scratch_for(sizes, slots, device))
         wp.synchronize_device(device)
         return
-    threads = max(1, min(threads, -(-count // CHUNK)))
-    starts = iter(range(0, count, CHUNK))
+    threads = max(1, min(threads, -(-count // chunk)))
+    starts = iter(range(0, count, chunk))
     lock = threading.Lock()
 
     def worker() -> None:
-        scratch = _scratch(sizes, 1, device)
+        scratch = scratch_for(sizes, 1, device)
         while True:
             with lock:
                 first = next(starts, None)
             if first is None:
                 return
-            launch(first, min(first + CHUNK, count), 1, *scratch)
+            launch(first, min(first + chunk, count), 1, *scratch)
 
     if threads == 1:
         worker()
@@ -78,7 +79,8 @@ def run_sliced(
             done.result()
 
 
-def _scratch(sizes: SlotSizes, slots: int, device: str) -> tuple[wp.array, wp.array]:
+def scratch_for(sizes: SlotSizes, slots: int, device: str) -> tuple[wp.array, wp.array]:
+    """Scratch of some slots: float64 values and integers."""
     return (
         wp.zeros(sizes.values * slots, dtype=wp.float64, device=device),
         wp.zeros(max(1, sizes.integers * slots), dtype=int, device=device),

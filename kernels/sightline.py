@@ -25,6 +25,8 @@ ORIENT_BOUND = wp.constant(wp.float64(1.0e-15))
 PADDING = wp.constant(wp.float64(0.001))
 # Sightline ends are multiples of 2**-10 grid steps, so that origin, direction and their sum are exact in float64.
 QUANTUM = wp.constant(wp.float64(1024.0))
+# Points drawn on an object before giving up that one falls into the wanted box.
+PICKS = wp.constant(64)
 
 
 @wp.struct
@@ -162,6 +164,15 @@ def random_point(state: wp.uint32, lo: wp.vec3d, hi: wp.vec3d) -> wp.vec3d:
     return out
 
 
+@wp.func
+def holds(lo: wp.vec3i, hi: wp.vec3i, point: wp.vec3d) -> bool:
+    """Whether the point lies in the box, rounding forgiven."""
+    for i in range(3):
+        if point[i] < f64(lo[i]) - PADDING or point[i] > f64(hi[i]) + PADDING:
+            return False
+    return True
+
+
 @wp.struct
 class Aims:
     """Work of `launch_aim`: source and target boxes, object to hit (-1: none), and the object's triangle range."""
@@ -196,6 +207,7 @@ def _aim(
     last: int,
     slots: int,
     tries: int,
+    boxed: int,
     found_out: wp.array(dtype=wp.uint8),
     origins_out: wp.array(dtype=wp.vec3d),
     ends_out: wp.array(dtype=wp.vec3d),
@@ -217,21 +229,28 @@ def _aim(
                     origin = pull(origin, aims.hint_origin[row], reach)
                     end = pull(end, aims.hint_end[row], reach)
             else:
-                low = int(aims.begin[row])
-                high = int(aims.end[row] - 1)
-                before = f64(0.0)
-                if low > 0:
-                    before = running_area[low - 1]
-                pick = before + f64(wp.randf(state)) * (running_area[high] - before)
-                while low < high:
-                    middle = (low + high) // 2
-                    if running_area[middle] < pick:
-                        low = middle + 1
-                    else:
-                        high = middle
-                s = wp.sqrt(f64(wp.randf(state)))
-                t = f64(wp.randf(state))
-                end = real(a[low]) * (f64(1.0) - s) + real(b[low]) * (s * (f64(1.0) - t)) + real(c[low]) * (s * t)
+                picks = int(0)
+                while picks < PICKS:
+                    picks += 1
+                    low = int(aims.begin[row])
+                    high = int(aims.end[row] - 1)
+                    before = f64(0.0)
+                    if low > 0:
+                        before = running_area[low - 1]
+                    pick = before + f64(wp.randf(state)) * (running_area[high] - before)
+                    while low < high:
+                        middle = (low + high) // 2
+                        if running_area[middle] < pick:
+                            low = middle + 1
+                        else:
+                            high = middle
+                    s = wp.sqrt(f64(wp.randf(state)))
+                    t = f64(wp.randf(state))
+                    end = real(a[low]) * (f64(1.0) - s) + real(b[low]) * (s * (f64(1.0) - t)) + real(c[low]) * (s * t)
+                    if boxed == 0 or holds(aims.target_lo[row], aims.target_hi[row], end):
+                        picks = PICKS
+                if attempt % 2 == 1:
+                    origin = pull(origin, aims.hint_origin[row], f64(1.0) / f64(1 + attempt))
             origin = quantised(origin)
             end = quantised(end)
             attempt += 1
@@ -309,6 +328,7 @@ def launch_aim(
     seeds: np.ndarray,
     *,
     tries: int,
+    boxed: bool = False,
     threads: int = 1,
     device: str = "cpu",
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -318,12 +338,14 @@ def launch_aim(
         scene: opaque triangles.
         targets: triangles to aim at.
         sources: source box of each row [grid steps], shape (n, 2, 3), int32.
-        boxes: target box of each row; used where owner is -1.
+        boxes: target box of each row; used where owner is -1 or `boxed`.
         hints: origin and end of a sightline that the axial model allows [grid steps], shape (n, 2, 3), float64.
         owners: object to hit, or -1 to reach a point of the target box.
         ranges: the object's first and past-the-last row in `targets`, shape (n, 2), int.
         seeds: of each row's random stream, shape (n,), int.
         tries: sightlines shot a row at most.
+        boxed: aim only at the part of the object inside the row's box (most of the time: a part that random points on
+            the object rarely hit is given up, and the point is used as it is).
         threads: CPU threads.
         device: Warp device.
 
@@ -357,6 +379,7 @@ def launch_aim(
                 last,
                 slots,
                 tries,
+                int(boxed),
                 found,
                 origins,
                 ends,

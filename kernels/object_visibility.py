@@ -1,0 +1,156 @@
+"""Cell-to-object visibility of blocks of source cells.
+
+An object is potentially visible if some cell that is not hidden holds a part of it whose box, clipped to that cell by
+the object's triangles, a sightline can reach. Source: Funkhouser et al. 1996, section 3.2; the clipped boxes are
+sharper.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data.incidence import Incidence
+from .cell_visibility import CellRows, Model, outside, search_rounds, seeds, segments
+from .sightline import launch_aim
+
+# Sightlines aimed at each object before anything is proved: most visible objects fall to the first few.
+FIRST_TRIES = 12
+AIM_ROUNDS = (32, 128, 512)
+
+
+@dataclass
+class ObjectRows:
+    """Reached (cell, object) pairs of a block of sources, ordered; columns as in data/database.py."""
+
+    source: np.ndarray
+    target: np.ndarray
+    seen: np.ndarray
+    origin: np.ndarray
+    end: np.ndarray
+
+
+@dataclass
+class ObjectModel:
+    """Where objects lie: their incidence with the cells, and each one's rows among the aim targets."""
+
+    incidence: Incidence
+    ranges: np.ndarray
+
+
+def object_rows(model: Model, objects: ObjectModel, reached: CellRows) -> ObjectRows:
+    """Every object that is not proved hidden from the sources of `reached`.
+
+    Returns:
+        Reached pairs. A pair that is left out is hidden, exactly. A `seen` pair's witness ends on the object, starts
+        outside every solid, and clears all opaque triangles but the object's own.
+    """
+    incidence = objects.incidence
+    sizes = np.diff(incidence.starts)[reached.target]
+    parts = np.repeat(incidence.starts[reached.target], sizes) + _ramp(sizes)
+    part_source = np.repeat(reached.source, sizes)
+    keys, pair_of = np.unique(_key(part_source, incidence.object_id[parts], len(objects.ranges)), return_inverse=True)
+    source, target = np.divmod(keys, len(objects.ranges))
+    rows = ObjectRows(source, target, np.zeros(len(keys), bool), np.zeros((len(keys), 3)), np.zeros((len(keys), 3)))
+    cells = model.graph.cells
+    everything = np.arange(len(keys))
+    _aim(model, objects, rows, everything, cells[source], cells[source].mean(axis=1), target, FIRST_TRIES, 0)
+    potential, hints, kept_parts, hint_pair = _prove(model, objects, rows, parts, part_source, pair_of)
+    for number, tries in enumerate(AIM_ROUNDS):
+        todo = np.flatnonzero(~rows.seen[hint_pair])
+        at = kept_parts[todo]
+        _aim(model, objects, rows, hint_pair[todo], incidence.boxes[at], hints[todo], at, tries, number + 1)
+    kept = np.flatnonzero(potential | rows.seen)
+    return ObjectRows(source[kept], target[kept], rows.seen[kept], rows.origin[kept], rows.end[kept])
+
+
+def _key(source: np.ndarray, target: np.ndarray, count: int) -> np.ndarray:
+    return source.astype(np.int64) * count + target
+
+
+def _ramp(sizes: np.ndarray) -> np.ndarray:
+    """0, 1, ..., n - 1 for each size n, concatenated."""
+    ends = np.cumsum(sizes)
+    return np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - sizes, sizes)
+
+
+def _prove(
+    model: Model,
+    objects: ObjectModel,
+    rows: ObjectRows,
+    parts: np.ndarray,
+    part_source: np.ndarray,
+    pair_of: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Try to hide every part of the pairs that are not seen.
+
+    Returns:
+        Which pairs stay potential, bool; and for every part that could not be hidden the start of a line to it, its
+        row in the incidence, and its pair.
+    """
+    incidence, cells = objects.incidence, model.graph.cells
+    todo = np.flatnonzero(~rows.seen[pair_of])
+    own = incidence.cell[parts[todo]] == part_source[todo]
+    potential = np.zeros(len(rows.source), bool)
+    potential[pair_of[todo[own]]] = True
+    kept_own = todo[own]
+    todo = todo[~own]
+    todo = todo[~potential[pair_of[todo]]]
+    boxes = np.concatenate([cells, incidence.boxes[parts[todo]]])
+    work = np.column_stack([part_source[todo], len(cells) + np.arange(len(todo)), np.ones(len(todo), int)])
+    answers = search_rounds(model, boxes, work)
+    open_rows = np.flatnonzero(answers.verdict != 0)
+    potential[pair_of[todo[open_rows]]] = True
+    hints = cells[part_source[todo[open_rows]]].mean(axis=1)
+    lined = answers.verdict[open_rows] == 1
+    at = todo[open_rows[lined]]
+    hints[lined] = segments(answers, open_rows[lined], cells[part_source[at]], incidence.boxes[parts[at]])[0]
+    kept = np.concatenate([kept_own, todo[open_rows]])
+    hints = np.concatenate([cells[part_source[kept_own]].mean(axis=1), hints])
+    return potential, hints, parts[kept], pair_of[kept]
+
+
+def _aim(
+    model: Model,
+    objects: ObjectModel,
+    rows: ObjectRows,
+    pairs: np.ndarray,
+    boxes: np.ndarray,
+    hints: np.ndarray,
+    streams: np.ndarray,
+    tries: int,
+    number: int,
+) -> None:
+    """Shoot at the objects of the pairs; fills seen, origin and end in place.
+
+    Args:
+        model: the model.
+        objects: where objects lie.
+        rows: all pairs.
+        pairs: pair of each attempt; a pair may be attempted through several boxes.
+        boxes: aim at the part of the object inside this box; ignored in round 0.
+        hints: start of a line that the axial model allows [grid steps], shape (n, 3).
+        streams: what tells the random streams of one source apart, shape (n,), int.
+        tries: sightlines an attempt.
+        number: of the round.
+    """
+    if not len(pairs):
+        return
+    source, target = rows.source[pairs], rows.target[pairs]
+    found, origin, end = launch_aim(
+        model.triangles,
+        model.targets,
+        model.graph.cells[source],
+        boxes,
+        np.stack([hints, hints], axis=1),
+        target,
+        objects.ranges[target],
+        seeds(model.seed + 101 * (number + 1), source, streams),
+        tries=tries,
+        boxed=number > 0,
+        threads=model.threads,
+        device=model.device,
+    )
+    good = np.flatnonzero(found)
+    good = good[outside(model, source[good], origin[good], np.ones(len(good), bool))]
+    rows.seen[pairs[good]] = True
+    rows.origin[pairs[good]], rows.end[pairs[good]] = origin[good], end[good]
