@@ -1,0 +1,175 @@
+"""The command line: arguments in, an exit code out. The commands themselves are in `commands`, imported when one runs.
+
+Exit 0: done, nothing forbidden found; 1: a check failed; 2: unusable input or arguments; 130: interrupted.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import NoReturn
+
+from .. import __version__
+from ..data.errors import InputError
+
+FAILED, UNUSABLE, INTERRUPTED = 1, 2, 130
+# Seeds go to kernels as int32.
+SEED_LIMIT = 2**31
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and say what came of it.
+
+    Args:
+        argv: arguments after the program's name; by default those of the process.
+
+    Returns:
+        The exit code. What the user can mend, a full disk and a lack of memory are one line on stderr.
+    """
+    try:
+        options = _parser().parse_args(argv)
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else 0
+    try:
+        from . import commands
+
+        return getattr(commands, options.run)(options)
+    except KeyboardInterrupt:
+        _complain("interrupted; run the same command again to resume")
+        return INTERRUPTED
+    except InputError as error:
+        _complain(str(error))
+    except MemoryError as error:
+        _complain(f"expected enough memory, found too little{f' ({error})' if str(error) else ''}")
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        _complain(f"{where}expected to be able to read and write, found {error.strerror or error}")
+    return UNUSABLE
+
+
+def say(text: str) -> None:
+    """Print a result; a reader that has gone away changes neither the work nor the exit code."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        # Python flushes stdout once more at exit; that must not fail either.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _complain(message: str) -> None:
+    """One line on stderr, whatever the message."""
+    print(f"viewcell: {' '.join(message.split())}", file=sys.stderr)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Complain and exit 2."""
+        _complain(f"{message} (see {self.prog} --help)")
+        raise SystemExit(UNUSABLE)
+
+
+def _whole(least: int, most: int | None = None) -> Callable[[str], int]:
+    """Reads a whole number in a range."""
+    bounds = f"from {least}" + (f" to {most}" if most is not None else "")
+
+    def read(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = None
+        if value is None or value < least or (most is not None and value > most):
+            raise argparse.ArgumentTypeError(f"expected a whole number {bounds}, found {text!r}")
+        return value
+
+    return read
+
+
+def _number(text: str) -> float:
+    """Reads a number; its range is checked where it is used."""
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a number, found {text!r}") from None
+
+
+def _cells(text: str) -> list[int]:
+    """Reads ids separated by commas."""
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected ids separated by commas, found {text!r}") from None
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="viewcell", description="From-region visibility for buildings, with a proof on both sides.")
+    parser.add_argument("--version", action="version", version=f"viewcell {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_make(commands)
+    _add_bake(commands)
+    _add_verify(commands)
+    _add_report(commands)
+    return parser
+
+
+def _command(commands: argparse._SubParsersAction, name: str, run: str, text: str) -> argparse.ArgumentParser:
+    """A sub-parser whose arguments are handed to the function `run` of `commands`."""
+    parser = commands.add_parser(name, help=text, description=text)
+    parser.set_defaults(run=run)
+    return parser
+
+
+def _seed(parser: argparse.ArgumentParser, of: str) -> None:
+    parser.add_argument("--seed", type=_whole(0, SEED_LIMIT - 1), default=0, help=f"of {of}; 0 by default")
+
+
+def _add_make(commands: argparse._SubParsersAction) -> None:
+    make = commands.add_parser("make", help="make a synthetic building", description="Make a synthetic building.")
+    buildings = make.add_subparsers(title="buildings", metavar="BUILDING", required=True)
+    office = _command(buildings, "office", "make_office", "Make an office building and print its polygons by level.")
+    office.add_argument(
+        "--out", default="office.scene", help="X.scene (ready to bake) or X.glb; office.scene by default"
+    )
+    office.add_argument("--floors", type=_whole(1), help="storeys, 1 to 100; 3 by default")
+    office.add_argument("--rooms-per-side", type=_whole(1), help="offices on each side of the corridor; 8 by default")
+    office.add_argument("--like", choices=["soda-hall"], help="a published model's size and statistics instead")
+    _seed(office, "windows, doors and furniture")
+
+
+def _add_bake(commands: argparse._SubParsersAction) -> None:
+    bake = _command(commands, "bake", "bake", "Compute what can be seen from each cell of a model.")
+    bake.add_argument("model", metavar="MODEL", help="IFC, glTF, OBJ, PLY, STL, a scene folder, or cells and portals")
+    bake.add_argument("--out", metavar="BAKE", help="folder to write; MODEL's name with .bake by default")
+    bake.add_argument("--up", choices=["y", "z"], help="axis that points up in a mesh file")
+    bake.add_argument("--unit", help="unit of a mesh file, a name or metres; metre by default")
+    bake.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")
+    bake.add_argument(
+        "--threshold", type=_number, default=0.0, metavar="M2", help="planes with less opaque area do not cut cells"
+    )
+    _seed(bake, "random sightlines")
+    bake.add_argument(
+        "--budget", type=_number, metavar="SECONDS", help="stop refining then; the rest is unknown, never hidden"
+    )
+    bake.add_argument("--threads", type=_whole(1), help="CPU threads; all cores by default")
+    bake.add_argument("--device", default="cpu", help="Warp device, such as cuda:0; cpu by default")
+    bake.add_argument("--overwrite", action="store_true", help="bake again even if BAKE is up to date")
+    bake.add_argument("--no-progress", action="store_true", help="no progress bar")
+
+
+def _add_verify(commands: argparse._SubParsersAction) -> None:
+    verify = _command(commands, "verify", "verify", "Try to refute a bake with rays, and check every witness exactly.")
+    verify.add_argument(
+        "bake", metavar="BAKE", nargs="?", help="bake folder; with --replay, that of the case if left out"
+    )
+    verify.add_argument("--rays", type=_whole(0), default=1_000_000, help="to cast at least; 1,000,000 by default")
+    verify.add_argument("--replay", metavar="CASE", help="judge the sightline of a case file again, and nothing else")
+    verify.add_argument("--no-progress", action="store_true", help="no progress bar")
+    _seed(verify, "origins and directions")
+
+
+def _add_report(commands: argparse._SubParsersAction) -> None:
+    report = _command(commands, "report", "report", "Write plans, sets and numbers of a bake as Markdown and PNG.")
+    report.add_argument("bake", metavar="BAKE", help="bake folder")
+    report.add_argument("--cells", type=_cells, metavar="ID,ID", help="cells to show; three telling ones by default")
+    report.add_argument("--out", metavar="FOLDER", help="folder to write; BAKE/report by default")

@@ -1,0 +1,143 @@
+"""What each command does: reads its options, calls the public functions, prints what they found.
+
+Nothing heavy is imported before it is needed: an argument that is wrong is refused at once.
+"""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from ..data.errors import InputError
+from .cli import FAILED, say
+from .summary import summary, table
+
+
+def make_office(options: argparse.Namespace) -> int:
+    """Make an office, write it and print its levels of detail."""
+    from ..data.buildings.glb import write_glb
+    from ..data.buildings.office import make_office as build
+    from ..data.buildings.statistics import level_statistics
+    from ..data.scene_folder import write_scene
+
+    writers = {".scene": write_scene, ".glb": write_glb}
+    out = Path(options.out)
+    if out.suffix not in writers:
+        raise InputError(f"out: expected a name ending in {' or '.join(writers)}, found {options.out!r}")
+    size = {"floors": options.floors, "rooms_per_side": options.rooms_per_side}
+    size = {name: value for name, value in size.items() if value is not None}
+    if options.like and size:
+        raise InputError(f"like: expected no other size beside {options.like}, found {', '.join(size)}")
+    scene = build(seed=options.seed, like=options.like, **size)
+    writers[out.suffix](scene, out)
+    rows = [(r.level, r.objects, r.polygons, r.minimum, f"{r.mean:,.2f}", r.maximum) for r in level_statistics(scene)]
+    say(table(("level of detail", "objects", "polygons", "min per object", "mean", "max"), rows))
+    say(f"written to {out}")
+    return 0
+
+
+def bake(options: argparse.Namespace) -> int:
+    """Bake a model and print what came of it."""
+    from .bake import Settings
+    from .bake import bake as compute
+
+    _start_warp()
+    model = Path(options.model)
+    settings = Settings(threshold_m2=options.threshold, seed=options.seed, doors=options.doors or "open")
+    # `resolve` gives "." and ".." a name.
+    out = Path(options.out) if options.out else Path(f"{model.resolve().stem or 'model'}.bake")
+    before = _stamp(out)
+    made = compute(
+        _read(model, options),
+        out,
+        settings=settings,
+        budget_s=options.budget,
+        threads=options.threads,
+        device=options.device,
+        overwrite=options.overwrite,
+        progress=_progress(options),
+    )
+    say(summary(made))
+    # A bake that is written anew is a new folder.
+    fresh = _stamp(out) != before
+    say(f"written to {made.folder}" if fresh else f"{made.folder} was up to date; --overwrite bakes it again")
+    return 0
+
+
+def _read(model: Path, options: argparse.Namespace) -> object:
+    """The model as `bake` takes it: a scene where options say how to read the file, else its path."""
+    if model.is_dir() and (options.up or options.unit or options.doors == "closed"):
+        raise InputError(f"{model}: expected a model file beside --up, --unit and closed doors, found a folder")
+    if options.up is None and options.unit is None:
+        return model
+    from ..data.readers import read
+
+    return read(model, up=options.up, unit=_unit(options.unit), doors=options.doors or "open")
+
+
+def _unit(text: str | None) -> str | float | None:
+    """A unit's name, or metres as a number."""
+    try:
+        return text if text is None else float(text)
+    except ValueError:
+        return text
+
+
+def _stamp(out: Path) -> tuple[int, int] | None:
+    """What tells a folder from another of the same name."""
+    try:
+        found = (out / "manifest.json").stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns
+
+
+def verify(options: argparse.Namespace) -> int:
+    """Check a bake, or one case; the exit code says whether it stood."""
+    from ..data.database import load
+
+    _start_warp()
+    if options.bake is None and options.replay is None:
+        raise InputError("verify: expected a bake folder or --replay CASE, found neither")
+    made = None if options.bake is None else load(options.bake)
+    from .verify import replay
+    from .verify import verify as check
+
+    if options.replay is not None:
+        outcome = replay(options.replay, made)
+        say(outcome.line())
+        return 0 if outcome.ok else FAILED
+    result = check(made, rays=options.rays, seed=options.seed, progress=_progress(options))
+    say(result.table())
+    return 0 if result.ok else FAILED
+
+
+def report(options: argparse.Namespace) -> int:
+    """Write a report and say where it is."""
+    from ..data.database import load
+
+    made = load(options.bake)
+    from .report import report as write
+
+    say(str(write(made, cells=options.cells, out=options.out)))
+    return 0
+
+
+def _start_warp() -> None:
+    """Start Warp without its greeting, and without its warning that there is no GPU, which no setting silences."""
+    import warp
+
+    warp.config.log_level = warp.LOG_WARNING
+    stderr = os.dup(2)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        warp.init()
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+
+
+def _progress(options: argparse.Namespace) -> bool:
+    """Whether to show a bar: only to somebody who watches."""
+    return not options.no_progress and sys.stderr.isatty()

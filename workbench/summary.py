@@ -1,0 +1,52 @@
+"""A finished bake in a few lines, for people."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..data.database import Bake
+
+SKIPPED_SHOWN = 3
+LEAK_SHOWN = 12
+
+
+def summary(bake: "Bake") -> str:
+    """Counts, potential and seen pairs, seconds, and what was left out."""
+    from ..verify.findings import count_pairs
+
+    counts, facts = bake.manifest["counts"], bake.manifest
+    because = facts.get("inhabitable_because", "as its cells table says")
+    lines = [
+        f"{counts['cells']:,} cells, {counts['inhabitable']:,} inhabitable ({because})",
+        f"{counts['portals']:,} portals, {counts['objects']:,} objects",
+    ]
+    leak = facts.get("leak_cells") or []
+    if leak:
+        shown = ", ".join(str(cell) for cell in leak[:LEAK_SHOWN]) + (", ..." if len(leak) > LEAK_SHOWN else "")
+        lines.append(f"the outside leaks in, through {len(leak)} cells: {shown}")
+    rows = [(c.name, *c.columns()) for c in count_pairs(bake)]
+    lines += ["", table(("seen from inhabitable cells", "potential", "seen", "overestimate", "unknown"), rows), ""]
+    lines.append("seconds: " + ", ".join(f"{name} {value:.1f}" for name, value in facts["seconds"].items()))
+    return "\n".join(lines + _skipped(facts.get("skipped", [])))
+
+
+def _skipped(skipped: list[dict[str, str]]) -> list[str]:
+    if not skipped:
+        return []
+    lines = [f"skipped {len(skipped):,}:"]
+    lines += [
+        f"  {' '.join(part['what'].split())}: {' '.join(part['why'].split())}" for part in skipped[:SKIPPED_SHOWN]
+    ]
+    if len(skipped) > SKIPPED_SHOWN:
+        lines.append("  ... (all of them are in manifest.json)")
+    return lines
+
+
+def table(head: tuple[str, ...], rows: list[tuple]) -> str:
+    """Rows in columns: the first to the left, the others, numbers, to the right."""
+    cells = [head, *([f"{value:,}" if isinstance(value, int) else str(value) for value in row] for row in rows)]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(head))]
+    lines = []
+    for row in cells:
+        padded = [text.rjust(width) for text, width in zip(row[1:], widths[1:], strict=True)]
+        lines.append("  ".join([row[0].ljust(widths[0]), *padded]))
+    return "\n".join(lines)
