@@ -2,14 +2,17 @@
 
 from fractions import Fraction
 from itertools import product
+from math import gcd
 from pathlib import Path
 
 import numpy as np
 import pytest
+import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from viewcell.data.errors import InputError
 from viewcell.data.verdict import Verdict
+from viewcell.kernels.stab import det_sign
 from viewcell.kernels.stab_batch import launch_stab
 from viewcell.verify.casefile import load_cases
 from viewcell.verify.certificate import check_certificate
@@ -32,6 +35,10 @@ VECTORS = {
     "shared edge": ([(0, 0, 0), (0, 1, 1), (1, 1, 0), (1, 2, 1), (2, 0, 0), (2, 1, 1)], False),
     "zero-area portal": ([(0, 0, 0), (0, 2, 2), (1, 1, 0), (1, 1, 2), (2, 0, 0), (2, 2, 2)], False),
     "point portal": ([(0, 0, 0), (0, 2, 2), (1, 1, 1), (1, 1, 1), (3, 0, 0), (3, 2, 2)], False),
+    "in a circle around a point": (
+        [(0, -9, -9), (9, 0, 9), (-9, 0, -9), (9, 9, 0), (-9, -9, 0), (0, 9, 9)],
+        False,
+    ),
     "A passes, B fails": (
         [(2, -1, 1), (4, 1, 1), (4, 3, 1), (5, 3, 2), (5, 4, 3), (5, 6, 4), (6, 3, 2), (6, 5, 4)],
         False,
@@ -80,8 +87,8 @@ def near_line(rng, n):
     """Portals around points of an oblique line, some of them just beside it."""
     speed = rng.integers(1, 400, 3)
     touch = rng.integers(-50, 50, 3) + np.sort(rng.choice(np.arange(1, 60), n, replace=False))[:, None] * speed
-    low, high = touch - rng.integers(0, 120, (n, 3)), touch + rng.integers(0, 120, (n, 3))
-    return flatten(rng, low, high, touch)
+    low = touch - rng.integers(-40, 120, (n, 3))
+    return flatten(rng, low, low + rng.integers(1, 160, (n, 3)), low)
 
 
 def razor_edge(rng, n):
@@ -111,12 +118,27 @@ def one_step_apart(rng, n):
 
 
 def kilometres(rng, n):
-    """Slits a few steps wide along a line of kilometres: determinants beyond what float64 holds."""
-    speed = rng.integers(1, 2**17, 3)
-    touch = rng.integers(-LIMIT // 4, 0, 3) + np.sort(rng.choice(np.arange(1, 60), n, replace=False))[:, None] * speed
-    width = 2 ** rng.integers(0, 12)
+    """Slits a few steps wide along a line as long as the grid: determinants beyond what float64 holds."""
+    speed = rng.integers(2**13, 2**15, 3)
+    touch = speed * np.sort(rng.choice(np.arange(-500, 500), n, replace=False))[:, None]
+    width = 2 ** rng.choice([0, 0, 1, 2, 4, 8])
     low, high = touch - rng.integers(0, width + 1, (n, 3)), touch + rng.integers(0, width + 1, (n, 3))
-    return flatten(rng, low, high, touch)
+    boxes = flatten(rng, low, high, touch)
+    # Wider in one direction now and then, or hardly any list would be stabbed.
+    boxes[:, 1] += rng.integers(0, width + 1, 3) * (boxes[:, 1] > boxes[:, 0])
+    return boxes
+
+
+def around_a_point(rng, n):
+    """Three boxes that a line would have to pass in a circle, touching in one point, or all but, and others over it."""
+    size = rng.integers(1, 40, (n, 2, 3))
+    boxes = np.stack([-size[:, 0], size[:, 1]], axis=1)
+    turn = rng.permutation(3)
+    for row in range(min(n, 3)):
+        boxes[row, 0, turn[row]] = boxes[row, 1, turn[row - 2]] = 0
+    gap = rng.integers(0, 2) * rng.integers(0, 2, (3, 3))
+    boxes[:3, 1] += gap[: len(boxes[:3])]
+    return boxes
 
 
 def flatten(rng, low, high, touch):
@@ -127,7 +149,7 @@ def flatten(rng, low, high, touch):
     return np.stack([low, high], axis=1)
 
 
-FAMILIES = (near_line, razor_edge, small_grid, one_step_apart, kilometres)
+FAMILIES = (near_line, razor_edge, small_grid, one_step_apart, kilometres, around_a_point)
 # Metres from the origin at 2**-10 m; the last one is what the grid holds, 100 km at 2**-7 m.
 OFFSETS = (0, 1000 * 1024, 10_000 * 1024, 100_000 * 128)
 
@@ -161,6 +183,34 @@ def test_hard_cases():
         boxes = case.boxes - case.boxes[0, 0] if np.abs(case.boxes).max() > LIMIT else case.boxes
         verdict = judge(boxes[None], np.array([case.signs]))[0]
         assert verdict == UNDECIDED or (verdict == STABBED) == (case.expected == "open"), case.name
+
+
+@wp.kernel
+def _signs(g: wp.array(dtype=wp.vec3d), v: wp.array(dtype=wp.vec3d), out: wp.array(dtype=int)):
+    row = wp.tid()
+    out[row] = det_sign(g[row], v[row])
+
+
+def test_sign_of_a_cut_is_exact():
+    """Integers as large as they get, whose products all but cancel: far below what float64 can tell."""
+    rng = np.random.default_rng(6)
+    cuts, corners, truth = [], [], []
+    while len(truth) < 1500:
+        g, h = rng.integers(-(2**26), 2**26, 3).tolist(), int(rng.integers(-(2**52), 2**52))
+        wanted = int(rng.integers(-2, 3) * 2 ** rng.integers(0, 30))
+        if g[1] == 0 or gcd(g[0], g[1]) != 1:
+            continue
+        rest = wanted - g[2] * h
+        first = rest * pow(g[0], -1, abs(g[1])) % abs(g[1]) + abs(g[1]) * int(rng.integers(-(2**25), 2**25))
+        corner = [first, (rest - g[0] * first) // g[1], h]
+        if max(map(abs, corner)) <= 2**53:
+            cuts.append(g)
+            corners.append(corner)
+            truth.append((wanted > 0) - (wanted < 0))
+    out = wp.zeros(len(truth), dtype=int, device="cpu")
+    inputs = [wp.array(np.array(x, float), dtype=wp.vec3d, device="cpu") for x in (cuts, corners)]
+    wp.launch(_signs, dim=len(truth), inputs=[*inputs, out], device="cpu")
+    np.testing.assert_array_equal(out.numpy(), truth)
 
 
 def check_generated(count, seed):
