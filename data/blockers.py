@@ -1,9 +1,9 @@
 """Blockers: large flat rectangles that no sightline between live cells can cross.
 
 On the plane x_i = k a sightline that stays in live cells can pass only through the open cross-section of a cell or
-through a portal on the plane. Everything else is blocked: opaque faces, the inside of solids, dead cells. Merging all
-of it on one plane before cutting it into *maximal, overlapping* rectangles is what makes single blockers strong: a
-wall's face has a gap where another wall joins it, the blocked region has none.
+through a portal on the plane, and nowhere through an opaque rectangle. Everything else is blocked: opaque faces, the
+inside of solids, dead cells. Merging all of it on one plane before cutting it into *maximal, overlapping* rectangles is
+what makes single blockers strong: a wall's face has a gap where another wall joins it, the blocked region has none.
 """
 
 from dataclasses import dataclass
@@ -12,6 +12,8 @@ import numpy as np
 
 from .graph import OTHER_AXES, CellGraph
 from .hierarchy import Hierarchy, build_hierarchy
+from .opaque import OpaquePlanes
+from .subdivide import PlaneIndex
 
 
 @dataclass
@@ -29,18 +31,25 @@ class Blockers:
     hierarchy: Hierarchy
 
 
-def find_blockers(graph: CellGraph) -> Blockers:
-    """Blockers of every plane that holds a cell face; each opaque piece of a face lies in at least one of them."""
+def find_blockers(graph: CellGraph, opaque: OpaquePlanes | None = None) -> Blockers:
+    """Blockers of every plane that holds a cell face or an opaque rectangle; each opaque piece lies in one or more.
+
+    Args:
+        graph: cells and portals.
+        opaque: opaque rectangles, on cell faces or not; None for a bare graph, whose faces say it all.
+    """
+    opaque = opaque or OpaquePlanes([np.zeros((0, 2, 3), np.int32)] * 3, 0.0, 0.0)
     pieces, axes = [], []
+    index = PlaneIndex(opaque)
     for axis in range(3):
-        planes = np.unique(graph.cells[:, :, axis])
+        planes = np.unique(np.concatenate([graph.cells[:, :, axis].ravel(), opaque.boxes[axis][:, 0, axis]]))
         low = np.argsort(graph.cells[:, 0, axis], kind="stable")
         starts = graph.cells[low, 0, axis]
         for k in planes:
             # Cells are few on a plane; the sorted lows cut the candidates to those that begin at or before it.
             near = low[: np.searchsorted(starts, k, side="right")]
             near = near[graph.cells[near, 1, axis] >= k]
-            rectangles = _plane_blockers(graph, axis, int(k), near)
+            rectangles = _plane_blockers(graph, axis, int(k), near, index.rectangles(axis, int(k)))
             if len(rectangles):
                 u, v = OTHER_AXES[axis]
                 boxes = np.full((len(rectangles), 2, 3), k, np.int32)
@@ -52,17 +61,26 @@ def find_blockers(graph: CellGraph) -> Blockers:
     return Blockers(boxes, axis_of, build_hierarchy(boxes))
 
 
-def _plane_blockers(graph: CellGraph, axis: int, k: int, near: np.ndarray) -> np.ndarray:
-    """Maximal blocked rectangles of one plane that hold part of a live cell's opaque face; shape (n, 2, 2), int32."""
+def _plane_blockers(graph: CellGraph, axis: int, k: int, near: np.ndarray, opaque: np.ndarray) -> np.ndarray:
+    """Maximal blocked rectangles of one plane that hold something opaque in reach of live cells; (n, 2, 2), int32."""
     uv = OTHER_AXES[axis]
     cells = graph.cells[near]
     faces = cells[(cells[:, 0, axis] == k) | (cells[:, 1, axis] == k)][:, :, uv]
     through = cells[(cells[:, 0, axis] < k) & (cells[:, 1, axis] > k)][:, :, uv]
     on_plane = (graph.portal_axis == axis) & (graph.portals[:, 0, axis] == k)
     gaps = np.concatenate([through, graph.portals[on_plane][:, :, uv]])
-    us, vs = np.unique(np.concatenate([faces, gaps])[:, :, 0]), np.unique(np.concatenate([faces, gaps])[:, :, 1])
-    blocked = ~paint(gaps, us, vs)
-    wanted = paint(faces, us, vs) & blocked
+    everything = np.concatenate([faces, gaps])
+    if not len(everything):
+        return np.zeros((0, 2, 2), np.int32)
+    # What lies beyond the live cells is blocked anyway, and clipping keeps the raster inside them.
+    opaque = np.clip(opaque, everything.min(axis=(0, 1)), everything.max(axis=(0, 1)))
+    opaque = opaque[(opaque[:, 1] > opaque[:, 0]).all(axis=1)]
+    everything = np.concatenate([everything, opaque])
+    us, vs = np.unique(everything[:, :, 0]), np.unique(everything[:, :, 1])
+    solid, open_ = paint(opaque, us, vs), paint(gaps, us, vs)
+    blocked = solid | ~open_
+    # A wall inside a solid hides nothing that the solid's faces do not.
+    wanted = (paint(faces, us, vs) & blocked) | (solid & open_)
     return maximal_rectangles(blocked, wanted, us, vs)
 
 

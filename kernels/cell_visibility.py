@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data.blockers import find_blockers
+from ..data.blockers import Blockers
 from ..data.database import VisibleRows
 from ..data.graph import CellGraph
 from ..data.solids import SolidIndex
@@ -24,6 +24,7 @@ class Model:
     """What the visibility of a model needs on the device; triangles, targets and solids are None for a bare graph."""
 
     graph: CellGraph
+    blockers: Blockers
     triangles: "Triangles | None"
     targets: "AimTargets | None"
     solids: SolidIndex | None
@@ -34,7 +35,7 @@ class Model:
     def __post_init__(self) -> None:
         """Copy the graph and its blockers to the device."""
         self.device_graph = device_graph(self.graph, self.device)
-        self.tree = blocker_tree(find_blockers(self.graph), self.device)
+        self.tree = blocker_tree(self.blockers, self.device)
 
 
 @dataclass

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ..data.blockers import find_blockers
 from ..data.database import VisibleRows
 from ..data.graph import CellGraph
 from ..data.incidence import populate
+from ..data.opaque import opaque_planes
 from ..data.scene import Role, Scene
 from ..data.solids import SolidIndex, closed_elements
 from . import flood, sightline, target, walk
@@ -19,6 +21,8 @@ from .target import TargetAnswers
 
 # A flood is tried on this many sources first; where more than a quarter run into the cap, sequences explode.
 SAMPLE = 24
+# Furniture smaller than this hides little and would fill the hierarchy of blockers.
+BLOCKING_DETAIL_M2 = 0.25
 
 
 @dataclass
@@ -45,17 +49,19 @@ class Engine:
         wp.config.quiet = True
         self.objects = None
         self.object_count = 0
-        triangles = targets = solids = None
+        triangles = targets = solids = opaque_rectangles = None
         if scene is not None:
             corners, owners = scene.triangles()
             opaque = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
+            opaque_rectangles = opaque_planes(corners[blocking_objects(scene)[owners]])
             triangles = device_triangles(corners[opaque], owners[opaque], device)
             targets = aim_targets(corners, device)
             solids = SolidIndex(graph.cells, closed_elements(scene))
             self.object_count = len(scene.objects)
             starts = np.searchsorted(owners, np.arange(self.object_count + 1))
             self.objects = ObjectModel(populate(scene, graph.cells), np.column_stack([starts[:-1], starts[1:]]))
-        self.model = Model(graph, triangles, targets, solids, device, threads, seed)
+        blockers = find_blockers(graph, opaque_rectangles)
+        self.model = Model(graph, blockers, triangles, targets, solids, device, threads, seed)
 
     def compile(self) -> None:
         """Load the kernels, so that their compilation is not counted as visibility."""
@@ -144,6 +150,14 @@ class Engine:
         cells = self.model.graph.cells
         origin, end = segments(answers, np.arange(len(source)), cells[source], cells[reached])
         return source, reached, origin, end
+
+
+def blocking_objects(scene: Scene) -> np.ndarray:
+    """Opaque objects worth a blocker: all occluders, and details with a side of BLOCKING_DETAIL_M2 or more; bool."""
+    sides = (scene.object_bounds()[:, 1] - scene.object_bounds()[:, 0]) * scene.grid_m
+    sides = np.sort(np.maximum(sides, 0.0), axis=1)
+    large = sides[:, 2] * sides[:, 1] >= BLOCKING_DETAIL_M2
+    return scene.object_mask(Role.OCCLUDER) | (scene.object_mask(Role.DETAIL) & large)
 
 
 def no_objects() -> ObjectRows:

@@ -16,13 +16,12 @@ from ..data.database import Bake, VisibleRows, write_bake
 from ..data.errors import InputError
 from ..data.graph import CellGraph
 from ..data.graph_folder import read_graph
-from ..data.incidence import populate
 from ..data.inhabit import find_inhabitable
 from ..data.opaque import opaque_planes
 from ..data.portals import find_portals
 from ..data.scene import GRID_M, Role, Scene
 from ..data.scene_folder import replaceable, scene_manifest
-from ..data.solids import SolidIndex, closed_elements, dead_cells
+from ..data.solids import closed_elements, dead_cells
 from ..data.subdivide import cut_rooms, merge, subdivide
 
 MARGIN_M = 2.0
@@ -228,8 +227,8 @@ def _visibility(
     progress: bool,
 ) -> tuple[VisibleRows, VisibleRows]:
     """Visibility of all inhabitable cells, block by block; finished blocks are kept beside the target."""
-    from ..kernels.launch import thread_count
     from ..kernels.engine import Engine
+    from ..kernels.launch import thread_count
 
     engine = Engine(scene, graph, seed=settings.seed, threads=thread_count(threads), device=device)
     clock.lap("prepare")
