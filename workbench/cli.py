@@ -173,3 +173,7 @@ def _add_report(commands: argparse._SubParsersAction) -> None:
     report.add_argument("bake", metavar="BAKE", help="bake folder")
     report.add_argument("--cells", type=_cells, metavar="ID,ID", help="cells to show; three telling ones by default")
     report.add_argument("--out", metavar="FOLDER", help="folder to write; BAKE/report by default")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
