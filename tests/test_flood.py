@@ -120,7 +120,10 @@ def test_shared_building():
     assert witnesses > 0.99 * lines
 
 
-@pytest.mark.parametrize(("name", "mean"), [("w48", 38.43), ("l50", 175.20), ("w300", 66.29), ("w1500", 74.57)])
+@pytest.mark.parametrize(
+    ("name", "mean"),
+    [("w48", 38.43), ("l50", 175.20), ("w300", 66.29), pytest.param("w1500", 74.57, marks=pytest.mark.slow)],
+)
 def test_published_means(name, mean):
     graph = shared_graph(name)
     engine = Engine(None, graph, seed=0, threads=2, device="cpu")
