@@ -412,3 +412,12 @@ def test_verify_is_callable_although_a_subpackage_has_its_name(baked):
         "assert callable(viewcell.bake) and callable(viewcell.report)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def test_readme_example_prints_what_the_readme_says(tmp_path):
+    readme = (Path(__file__).resolve().parents[1] / "README.md").read_text(encoding="utf-8")
+    code = readme.partition("```python\n")[2].partition("```")[0]
+    expected = readme.partition("```text\n")[2].partition("```")[0]
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
+    # Warp greets on stdout before.
+    assert done.stdout.endswith(expected)
