@@ -128,11 +128,30 @@ def portal_rows(
 ) -> CellRows:
     """Rows of a bare graph from its lines; a line that float64 cannot follow through the portals is no witness."""
     seen = accept(model, source, target, origin, end)
+    _jitter(model, source, target, origin, end, seen)
     # A pair may have been found from both of its ends: the one with a witness stays.
     order = np.lexsort((~seen, target, source))
     key = (source.astype(np.int64) * model.graph.cell_count + target)[order]
     order = order[np.diff(key, prepend=-1) != 0]
     return _finish(model, sources, source[order], target[order], seen[order], origin[order], end[order])
+
+
+def _jitter(
+    model: Model, source: np.ndarray, target: np.ndarray, origin: np.ndarray, end: np.ndarray, seen: np.ndarray
+) -> None:
+    """Move lines that run along a seam between portals, less and less; fills origin, end and seen in place."""
+    cells = model.graph.cells.astype(float)
+    random = np.random.default_rng(model.seed)
+    for power in np.repeat(np.arange(2, 14, 2), 8):
+        rows = np.flatnonzero(~seen & (origin != end).any(axis=1))
+        if not len(rows):
+            return
+        moved = []
+        for point, cell in ((origin[rows], cells[source[rows]]), (end[rows], cells[target[rows]])):
+            reach = (cell[:, 1] - cell[:, 0]) * 0.5**power
+            moved.append(np.round((point + random.uniform(-1.0, 1.0, point.shape) * reach) * 1024.0) / 1024.0)
+        good = accept(model, source[rows], target[rows], *moved)
+        origin[rows[good]], end[rows[good]], seen[rows[good]] = moved[0][good], moved[1][good], True
 
 
 def _finish(model: Model, sources: np.ndarray, *columns: np.ndarray) -> CellRows:

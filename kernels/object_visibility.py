@@ -53,7 +53,17 @@ def object_rows(model: Model, objects: ObjectModel, reached: CellRows) -> Object
     rows = ObjectRows(source, target, np.zeros(len(keys), bool), np.zeros((len(keys), 3)), np.zeros((len(keys), 3)))
     cells = model.graph.cells
     everything = np.arange(len(keys))
-    _aim(model, objects, rows, everything, cells[source], cells[source].mean(axis=1), target, FIRST_TRIES, 0)
+    _aim(
+        model,
+        objects,
+        rows,
+        everything,
+        cells[source],
+        cells[np.stack([source, source], axis=1)].mean(axis=2),
+        target,
+        FIRST_TRIES,
+        0,
+    )
     potential, hints, kept_parts, hint_pair = _prove(model, objects, rows, parts, part_source, pair_of)
     for number, tries in enumerate(AIM_ROUNDS):
         todo = np.flatnonzero(~rows.seen[hint_pair])
@@ -84,8 +94,8 @@ def _prove(
     """Try to hide every part of the pairs that are not seen.
 
     Returns:
-        Which pairs stay potential, bool; and for every part that could not be hidden the start of a line to it, its
-        row in the incidence, and its pair.
+        Which pairs stay potential, bool; and for every part that could not be hidden the ends of a line to it, shape
+        (n, 2, 3), its row in the incidence, and its pair.
     """
     incidence, cells = objects.incidence, model.graph.cells
     todo = np.flatnonzero(~rows.seen[pair_of])
@@ -100,12 +110,12 @@ def _prove(
     answers = search_rounds(model, boxes, work)
     open_rows = np.flatnonzero(answers.verdict != 0)
     potential[pair_of[todo[open_rows]]] = True
-    hints = cells[part_source[todo[open_rows]]].mean(axis=1)
-    lined = answers.verdict[open_rows] == 1
-    at = todo[open_rows[lined]]
-    hints[lined] = segments(answers, open_rows[lined], cells[part_source[at]], incidence.boxes[parts[at]])[0]
     kept = np.concatenate([kept_own, todo[open_rows]])
-    hints = np.concatenate([cells[part_source[kept_own]].mean(axis=1), hints])
+    hints = np.stack([cells[part_source[kept]].mean(axis=1), incidence.boxes[parts[kept]].mean(axis=1)], axis=1)
+    lined = np.flatnonzero(answers.verdict[open_rows] == 1)
+    at = todo[open_rows[lined]]
+    ends = segments(answers, open_rows[lined], cells[part_source[at]], incidence.boxes[parts[at]])
+    hints[len(kept_own) + lined] = np.stack(ends, axis=1)
     return potential, hints, parts[kept], pair_of[kept]
 
 
@@ -128,7 +138,7 @@ def _aim(
         rows: all pairs.
         pairs: pair of each attempt; a pair may be attempted through several boxes.
         boxes: aim at the part of the object inside this box; ignored in round 0.
-        hints: start of a line that the axial model allows [grid steps], shape (n, 3).
+        hints: ends of a line that the axial model allows [grid steps], shape (n, 2, 3).
         streams: what tells the random streams of one source apart, shape (n,), int.
         tries: sightlines an attempt.
         number: of the round.
@@ -141,7 +151,7 @@ def _aim(
         model.targets,
         model.graph.cells[source],
         boxes,
-        np.stack([hints, hints], axis=1),
+        hints,
         target,
         objects.ranges[target],
         seeds(model.seed + 101 * (number + 1), source, streams),

@@ -27,6 +27,7 @@ PADDING = wp.constant(wp.float64(0.001))
 QUANTUM = wp.constant(wp.float64(1024.0))
 # Points drawn on an object before giving up that one falls into the wanted box.
 PICKS = wp.constant(64)
+NEAR_PICKS = wp.constant(6)
 
 
 @wp.struct
@@ -95,8 +96,8 @@ def clears(p: wp.vec3d, q: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> b
 
 
 @wp.func
-def is_clear(scene: Triangles, p: wp.vec3d, q: wp.vec3d, except_owner: int) -> bool:
-    """Whether segment pq certainly clears every triangle, those of one object excepted (-1: none)."""
+def obstacle(scene: Triangles, p: wp.vec3d, q: wp.vec3d, except_owner: int) -> int:
+    """A triangle that segment pq does not certainly clear, or -1; those of one object excepted (-1: none)."""
     d = q - p
     count = scene.links.shape[0]
     node = int(0)
@@ -122,11 +123,11 @@ def is_clear(scene: Triangles, p: wp.vec3d, q: wp.vec3d, except_owner: int) -> b
             if item >= 0:
                 if scene.owner[item] != except_owner:
                     if not clears(p, q, real(scene.a[item]), real(scene.b[item]), real(scene.c[item])):
-                        return False
+                        return item
             node += 1
         else:
             node = link[0]
-    return True
+    return -1
 
 
 @wp.func
@@ -149,7 +150,7 @@ def _confirm(
     row = first + wp.tid()
     while row < last:
         clear_out[row] = wp.uint8(0)
-        if is_clear(scene, origins[row], ends[row], except_owner[row]):
+        if obstacle(scene, origins[row], ends[row], except_owner[row]) < 0:
             clear_out[row] = wp.uint8(1)
         row += slots
 
@@ -218,6 +219,8 @@ def _aim(
         found_out[row] = wp.uint8(0)
         owner = aims.owner[row]
         attempt = int(0)
+        recent = wp.vec4i(-1, -1, -1, -1)
+        newest = int(0)
         while attempt < tries:
             origin = random_point(state, real(aims.source_lo[row]), real(aims.source_hi[row]))
             end = wp.vec3d()
@@ -229,6 +232,12 @@ def _aim(
                     origin = pull(origin, aims.hint_origin[row], reach)
                     end = pull(end, aims.hint_end[row], reach)
             else:
+                # Odd attempts stay near the line that the axial model allows: of several points the nearest to its end.
+                near = boxed == 1 and attempt % 2 == 1
+                wanted = int(1)
+                if near:
+                    wanted = NEAR_PICKS
+                best = f64(1.0e300)
                 picks = int(0)
                 while picks < PICKS:
                     picks += 1
@@ -246,19 +255,38 @@ def _aim(
                             high = middle
                     s = wp.sqrt(f64(wp.randf(state)))
                     t = f64(wp.randf(state))
-                    end = real(a[low]) * (f64(1.0) - s) + real(b[low]) * (s * (f64(1.0) - t)) + real(c[low]) * (s * t)
-                    if boxed == 0 or holds(aims.target_lo[row], aims.target_hi[row], end):
-                        picks = PICKS
+                    point = real(a[low]) * (f64(1.0) - s) + real(b[low]) * (s * (f64(1.0) - t)) + real(c[low]) * (s * t)
+                    distance = wp.length_sq(point - aims.hint_end[row])
+                    if boxed == 0 or holds(aims.target_lo[row], aims.target_hi[row], point):
+                        if distance < best:
+                            best = distance
+                            end = point
+                        wanted -= 1
+                        if wanted == 0:
+                            picks = PICKS
+                if best == f64(1.0e300):
+                    end = point
                 if attempt % 2 == 1:
                     origin = pull(origin, aims.hint_origin[row], f64(1.0) / f64(1 + attempt))
             origin = quantised(origin)
             end = quantised(end)
             attempt += 1
-            if is_clear(scene, origin, end, owner):
-                found_out[row] = wp.uint8(1)
-                origins_out[row] = origin
-                ends_out[row] = end
-                attempt = tries
+            # What stopped the last sightlines of this row mostly stops the next one.
+            stopped = bool(False)
+            for k in range(4):
+                if recent[k] >= 0 and not stopped:
+                    item = recent[k]
+                    stopped = not clears(origin, end, real(scene.a[item]), real(scene.b[item]), real(scene.c[item]))
+            if not stopped:
+                item = obstacle(scene, origin, end, owner)
+                if item < 0:
+                    found_out[row] = wp.uint8(1)
+                    origins_out[row] = origin
+                    ends_out[row] = end
+                    attempt = tries
+                else:
+                    recent[newest] = item
+                    newest = (newest + 1) % 4
         row += slots
 
 
