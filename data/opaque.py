@@ -84,6 +84,9 @@ def plane_rectangles(triangles: np.ndarray) -> tuple[np.ndarray, float, float]:
 
 def _outline(triangles: np.ndarray) -> np.ndarray:
     """Directed edges (m, 2, 2) left after opposite ones cancelled; every triangle turned counter-clockwise."""
+    # Doubles go first: beside a partner that is single, a doubled triangle would leave their oblique edge standing.
+    order = np.lexsort((triangles[:, :, 1], triangles[:, :, 0]), axis=1)
+    triangles = np.unique(np.take_along_axis(triangles, order[:, :, None], axis=1), axis=0)
     a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     clockwise = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] < 0
     triangles = np.where(clockwise[:, None, None], triangles[:, ::-1], triangles)

@@ -105,6 +105,13 @@ def test_a_hole_stays_open():
     assert plane_rectangles(np.array(ring + plug, np.int32))[1] == 900
 
 
+def test_a_doubled_triangle_changes_nothing():
+    quad = np.array([[(0, 0), (90, 0), (90, 60)], [(0, 0), (90, 60), (0, 60)]], np.int32)
+    for extra in (quad[:1], quad[:1, ::-1], quad[1:, [1, 2, 0]]):
+        _, area, lost = plane_rectangles(np.concatenate([quad, extra]))
+        assert (area, lost) == (90 * 60, 0)
+
+
 def test_planes_keep_axes_and_ignore_oblique_triangles():
     quad = np.array([(0, 0), (4, 0), (4, 6), (0, 0), (4, 6), (0, 6)]).reshape(2, 3, 2)
     triangles = []
