@@ -6,6 +6,7 @@ import numpy as np
 from viewcell.data.graph import OTHER_AXES
 from viewcell.data.opaque import opaque_planes
 from viewcell.data.portals import find_portals
+from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene, Space
 from viewcell.data.subdivide import merge, subdivide
 from viewcell.data.verdict import Verdict
 from viewcell.verify.stab_exact import stab
@@ -72,3 +73,35 @@ def reached_matrix(graph):
     for source in range(graph.cell_count):
         out[source, list(reached_cells(graph, source, half))] = True
     return out | out.T
+
+
+UNIT_BOX = np.array(list(product((0, 1), repeat=3)))
+SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+BOX_FACES = np.array([face for a, b, c, d in SIDES for face in ((a, b, c), (a, c, d))], np.int32)
+
+
+def box_triangles(low, high):
+    """The closed surface of a box, outward, shape (12, 3, 3)."""
+    return (np.array(low) + UNIT_BOX * (np.array(high) - np.array(low)))[BOX_FACES]
+
+
+def tetrahedron(corners):
+    """A closed tetrahedron, outward, shape (4, 3, 3)."""
+    corners = np.array(corners)
+    if np.linalg.det((corners[1:] - corners[0]).astype(float)) < 0:
+        corners = corners[[0, 2, 1, 3]]
+    return corners[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]]
+
+
+def scene_of(parts, rooms=()):
+    """A scene of (triangles [grid steps], role) parts; rooms are boxes (low, high) [grid steps]."""
+    definitions, objects = [], []
+    for number, (triangles, role) in enumerate(parts):
+        faces = np.arange(3 * len(triangles), dtype=np.int32).reshape(-1, 3)
+        definitions.append(Definition(f"shape {number}", (Mesh(np.array(triangles).reshape(-1, 3) * GRID_M, faces),)))
+        objects.append(Instance(f"part {number}", "part", number, np.eye(4), Role(role)))
+    spaces = []
+    for number, (low, high) in enumerate(rooms):
+        corners = (np.array(low) + UNIT_BOX * (np.array(high) - np.array(low))) * GRID_M
+        spaces.append(Space(f"room {number}", corners, BOX_FACES))
+    return Scene(definitions, objects, spaces)
