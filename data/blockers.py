@@ -98,12 +98,12 @@ def maximal_rectangles(blocked: np.ndarray, wanted: np.ndarray, us: np.ndarray, 
     """Rectangles inside `blocked` that cannot grow and together cover `wanted`; shape (n, 2, 2), int32."""
     found: set[tuple[int, int, int, int]] = set()
     left = wanted.copy()
-    for i, j in np.argwhere(wanted):
-        if left[i, j]:
-            for first in (0, 1):
-                u0, u1, v0, v1 = grow(blocked, int(i), int(j), first)
-                left[u0:u1, v0:v1] = False
-                found.add((u0, u1, v0, v1))
+    while left.any():
+        i, j = divmod(int(left.argmax()), left.shape[1])
+        for first in (0, 1):
+            u0, u1, v0, v1 = grow(blocked, i, j, first)
+            left[u0:u1, v0:v1] = False
+            found.add((u0, u1, v0, v1))
     if not found:
         return np.zeros((0, 2, 2), np.int32)
     u0, u1, v0, v1 = np.array(sorted(found)).T

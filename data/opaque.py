@@ -33,8 +33,13 @@ class OpaquePlanes:
     lost_area: float
 
 
-def opaque_planes(triangles: np.ndarray) -> OpaquePlanes:
-    """Opaque rectangles of the axial triangles among `triangles` [grid steps], shape (m, 3, 3), int32."""
+def opaque_planes(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS) -> OpaquePlanes:
+    """Opaque rectangles of the axial triangles among `triangles`.
+
+    Args:
+        triangles: of opaque objects [grid steps], shape (m, 3, 3), int32.
+        oblique_steps: most steps of the staircase along an oblique outline; 1 for none.
+    """
     boxes, area, lost = [], 0.0, 0.0
     for axis in range(3):
         flat = np.ptp(triangles[:, :, axis], axis=1) == 0
@@ -44,7 +49,9 @@ def opaque_planes(triangles: np.ndarray) -> OpaquePlanes:
         ends = np.searchsorted(chosen[order, 0, axis], planes, side="right")
         begin, found = 0, [np.zeros((0, 2, 3), np.int32)]
         for k, end in zip(planes, ends, strict=True):
-            rectangles, kept, dropped = plane_rectangles(chosen[order[begin:end]][:, :, OTHER_AXES[axis]])
+            rectangles, kept, dropped = plane_rectangles(
+                chosen[order[begin:end]][:, :, OTHER_AXES[axis]], oblique_steps
+            )
             begin, area, lost = end, area + kept + dropped, lost + dropped
             flat_boxes = np.full((len(rectangles), 2, 3), k, np.int32)
             flat_boxes[:, :, OTHER_AXES[axis]] = rectangles
@@ -53,18 +60,19 @@ def opaque_planes(triangles: np.ndarray) -> OpaquePlanes:
     return OpaquePlanes(boxes, area, lost)
 
 
-def plane_rectangles(triangles: np.ndarray) -> tuple[np.ndarray, float, float]:
+def plane_rectangles(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS) -> tuple[np.ndarray, float, float]:
     """Disjoint rectangles inside the union of triangles of one plane.
 
     Args:
         triangles: corners (u, v) [grid steps], shape (m, 3, 2), int32, any orientation.
+        oblique_steps: as in `opaque_planes`.
 
     Returns:
         Rectangles, shape (n, 2, 2), int32 (low, high corner); their area; the area dropped along oblique outlines.
     """
     edges = _outline(triangles.astype(np.int64))
     oblique = (edges[:, 0] != edges[:, 1]).all(axis=1)
-    us, vs = (_breaks(edges, oblique, c) for c in (0, 1))
+    us, vs = (_breaks(edges, oblique, c, oblique_steps) for c in (0, 1))
     winding = np.zeros((len(us), len(vs)), np.int64)
     steep = edges[~oblique & (edges[:, 0, 0] == edges[:, 1, 0])]
     columns = np.searchsorted(us, steep[:, 0, 0])
@@ -101,11 +109,11 @@ def _outline(triangles: np.ndarray) -> np.ndarray:
     return np.concatenate([forward, backward]).reshape(-1, 2, 2)
 
 
-def _breaks(edges: np.ndarray, oblique: np.ndarray, c: int) -> np.ndarray:
+def _breaks(edges: np.ndarray, oblique: np.ndarray, c: int, most: int) -> np.ndarray:
     """Raster coordinates: every end, and steps along oblique edges."""
     extra = []
     for a, b in edges[oblique][:, :, c]:
-        steps = int(min(OBLIQUE_STEPS, abs(b - a) // OBLIQUE_STEP))
+        steps = int(min(most, abs(b - a) // OBLIQUE_STEP))
         if steps > 1:
             extra.append(np.linspace(a, b, steps + 1)[1:-1].astype(np.int64))
     return np.unique(np.concatenate([edges[:, :, c].ravel(), *extra]))

@@ -9,7 +9,7 @@ from ..data.blockers import find_blockers
 from ..data.database import VisibleRows
 from ..data.graph import CellGraph
 from ..data.incidence import populate
-from ..data.opaque import opaque_planes
+from ..data.opaque import OpaquePlanes, opaque_planes
 from ..data.scene import Role, Scene
 from ..data.solids import SolidIndex, closed_elements
 from . import flood, sightline, target, walk
@@ -21,8 +21,8 @@ from .target import TargetAnswers
 
 # A flood is tried on this many sources first; where more than a quarter run into the cap, sequences explode.
 SAMPLE = 24
-# Furniture smaller than this hides little and would fill the hierarchy of blockers.
-BLOCKING_DETAIL_M2 = 0.25
+# Smaller pieces of furniture hide little and would fill the hierarchy of blockers.
+BLOCKING_DETAIL_M2 = 0.1
 
 
 @dataclass
@@ -36,12 +36,22 @@ class Part:
 class Engine:
     """A model or a bare graph on a device, ready to answer."""
 
-    def __init__(self, scene: Scene | None, graph: CellGraph, *, seed: int, threads: int, device: str) -> None:
+    def __init__(
+        self,
+        scene: Scene | None,
+        graph: CellGraph,
+        opaque: OpaquePlanes | None,
+        *,
+        seed: int,
+        threads: int,
+        device: str,
+    ) -> None:
         """Copy what visibility needs to the device.
 
         Args:
             scene: the model; None for a bare graph.
             graph: its cells and portals.
+            opaque: opaque rectangles of its occluders; None for a bare graph.
             seed: of the random sightlines.
             threads: CPU threads.
             device: Warp device.
@@ -52,9 +62,9 @@ class Engine:
         triangles = targets = solids = opaque_rectangles = None
         if scene is not None:
             corners, owners = scene.triangles()
-            opaque = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
-            opaque_rectangles = opaque_planes(corners[blocking_objects(scene)[owners]])
-            triangles = device_triangles(corners[opaque], owners[opaque], device)
+            solid = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
+            opaque_rectangles = with_details(scene, opaque)
+            triangles = device_triangles(corners[solid], owners[solid], device)
             targets = aim_targets(corners, device)
             solids = SolidIndex(graph.cells, closed_elements(scene))
             self.object_count = len(scene.objects)
@@ -152,12 +162,23 @@ class Engine:
         return source, reached, origin, end
 
 
-def blocking_objects(scene: Scene) -> np.ndarray:
-    """Opaque objects worth a blocker: all occluders, and details with a side of BLOCKING_DETAIL_M2 or more; bool."""
-    sides = (scene.object_bounds()[:, 1] - scene.object_bounds()[:, 0]) * scene.grid_m
-    sides = np.sort(np.maximum(sides, 0.0), axis=1)
-    large = sides[:, 2] * sides[:, 1] >= BLOCKING_DETAIL_M2
-    return scene.object_mask(Role.OCCLUDER) | (scene.object_mask(Role.DETAIL) & large)
+def with_details(scene: Scene, opaque: OpaquePlanes) -> OpaquePlanes:
+    """The occluders' opaque rectangles and the large ones of details (furniture)."""
+    triangles, owners = scene.triangles()
+    triangles = triangles[scene.object_mask(Role.DETAIL)[owners]]
+    least = BLOCKING_DETAIL_M2 / scene.grid_m**2
+    boxes = []
+    # Half of a large rectangle is a large triangle; the fans that close round tops are not worth looking at.
+    large = opaque_planes(triangles[flat_area(np.ptp(triangles, axis=1)) >= least], oblique_steps=1)
+    for axis, (mine, others) in enumerate(zip(large.boxes, opaque.boxes, strict=True)):
+        both = np.concatenate([others, mine[flat_area(mine[:, 1] - mine[:, 0]) >= least]])
+        boxes.append(both[np.argsort(both[:, 0, axis], kind="stable")])
+    return OpaquePlanes(boxes, opaque.axial_area, opaque.lost_area)
+
+
+def flat_area(extent: np.ndarray) -> np.ndarray:
+    """Area of the two longest sides of boxes with this extent, shape (n, 3), float64."""
+    return np.sort(extent.astype(float), axis=1)[:, 1:].prod(axis=1)
 
 
 def no_objects() -> ObjectRows:

@@ -17,7 +17,7 @@ from ..data.errors import InputError
 from ..data.graph import CellGraph
 from ..data.graph_folder import read_graph
 from ..data.inhabit import find_inhabitable
-from ..data.opaque import opaque_planes
+from ..data.opaque import OpaquePlanes, opaque_planes
 from ..data.portals import find_portals
 from ..data.scene import GRID_M, Role, Scene
 from ..data.scene_folder import replaceable, scene_manifest
@@ -101,17 +101,18 @@ def bake(
     clock = Clock()
     if scene is None:
         graph, snapped = read_graph(graph_folder)
+        opaque = None
         clock.lap("read")
         facts = {"source": str(graph_folder), "sha256": "", "unit": "metre", "grid_m": GRID_M, "origin": [0.0] * 3}
         facts |= {"max_snap_m": snapped, "skipped": [], "counts": {"objects": 0}}
     else:
         facts = scene_manifest(scene)
-        graph, notes = build_graph(scene, settings, clock)
+        graph, opaque, notes = build_graph(scene, settings, clock)
         facts |= notes
     if not graph.inhabitable.any():
         raise InputError(f"{facts['source']}: expected at least one inhabitable cell, found none")
     cell_rows, object_rows = _visibility(
-        scene, graph, settings, out, print_, clock, budget_s, threads, device, progress
+        scene, graph, opaque, settings, out, print_, clock, budget_s, threads, device, progress
     )
     manifest = _manifest(facts, settings, print_, graph, cell_rows, object_rows, clock)
     made = write_bake(out, manifest, scene, graph, cell_rows, object_rows, facts["grid_m"])
@@ -180,8 +181,8 @@ def _finished(out: Path, print_: str) -> Bake | None:
     return Bake(out, manifest) if same else None
 
 
-def build_graph(scene: Scene, settings: Settings, clock: Clock) -> tuple[CellGraph, dict]:
-    """Cells, portals and inhabitable cells of a model, and what the manifest says of them."""
+def build_graph(scene: Scene, settings: Settings, clock: Clock) -> tuple[CellGraph, OpaquePlanes, dict]:
+    """Cells, portals and inhabitable cells of a model, its opaque rectangles, and what the manifest says of them."""
     triangles, owners = scene.triangles()
     clock.lap("read")
     occluders = scene.object_mask(Role.OCCLUDER)
@@ -207,7 +208,7 @@ def build_graph(scene: Scene, settings: Settings, clock: Clock) -> tuple[CellGra
         "axial_area_m2": round(opaque.axial_area * scene.grid_m**2, 3),
         "axial_area_lost_m2": round(opaque.lost_area * scene.grid_m**2, 3),
     }
-    return graph, notes
+    return graph, opaque, notes
 
 
 def _partial(out: Path) -> Path:
@@ -217,6 +218,7 @@ def _partial(out: Path) -> Path:
 def _visibility(
     scene: Scene | None,
     graph: CellGraph,
+    opaque: OpaquePlanes | None,
     settings: Settings,
     out: Path,
     print_: str,
@@ -230,7 +232,7 @@ def _visibility(
     from ..kernels.engine import Engine
     from ..kernels.launch import thread_count
 
-    engine = Engine(scene, graph, seed=settings.seed, threads=thread_count(threads), device=device)
+    engine = Engine(scene, graph, opaque, seed=settings.seed, threads=thread_count(threads), device=device)
     clock.lap("prepare")
     engine.compile()
     clock.lap("compile")
