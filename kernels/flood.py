@@ -187,8 +187,10 @@ def _flood(
         row += slots
 
 
-# Sources a launch: what they find is collected after each, so a launch's room is this times the number of cells.
+# Sources a CPU launch: what they find is collected after each, so a launch's room is this times the number of cells.
 CHUNK = 64
+# Pairs a GPU launch has room for, 60 bytes each.
+GPU_ROOM = 2**25
 
 
 @dataclass
@@ -252,7 +254,8 @@ def launch_flood(
         gathered.append(tuple(x[:used].numpy().copy() for x in (found.pair, found.line, found.offset)))
 
     sizes = SlotSizes(int(SLOT_SIZE), (int(MAX_DEPTH) + 1) * int(FRAME))
-    run_sliced(launch, count, sizes, module=__name__, threads=threads, device=device, chunk=CHUNK)
+    chunk = CHUNK if wp.get_device(device).is_cpu else max(CHUNK, GPU_ROOM // cells)
+    run_sliced(launch, count, sizes, module=__name__, threads=threads, device=device, chunk=chunk)
     pairs, line, offset = (np.concatenate(column) for column in zip(*gathered, strict=True))
     order = np.lexsort((pairs[:, 1], pairs[:, 0]))
     spent = tests.numpy()[:, list(octants)]

@@ -46,7 +46,7 @@ def run_sliced(
 ) -> None:
     """Call `launch(first, last, slots, scratch, frames)` until all items are done.
 
-    On a GPU once, with many slots. On the CPU in chunks from `threads` threads, one slot each: Warp runs a CPU launch
+    On a GPU with many slots at once. On the CPU in chunks from `threads` threads, one slot each: Warp runs a CPU launch
     on the calling thread and releases the GIL. Items may not depend on each other, so the result does not depend on
     this.
     """
@@ -54,8 +54,11 @@ def run_sliced(
         return
     wp.load_module(module, device=device)
     if not wp.get_device(device).is_cpu:
-        slots = min(count, GPU_SLOTS)
-        launch(0, count, slots, *scratch_for(sizes, slots, device))
+        step = count if chunk == CHUNK else chunk
+        slots = min(step, GPU_SLOTS)
+        scratch = scratch_for(sizes, slots, device)
+        for first in range(0, count, step):
+            launch(first, min(first + step, count), slots, *scratch)
         wp.synchronize_device(device)
         return
     threads = max(1, min(threads, -(-count // chunk)))
@@ -75,8 +78,13 @@ def run_sliced(
         worker()
         return
     with ThreadPoolExecutor(threads) as pool:
-        for done in [pool.submit(worker) for _ in range(threads)]:
-            done.result()
+        try:
+            for done in [pool.submit(worker) for _ in range(threads)]:
+                done.result()
+        finally:
+            # After Ctrl-C or an error the workers end with the chunk they are in.
+            with lock:
+                starts = iter(())
 
 
 def scratch_for(sizes: SlotSizes, slots: int, device: str) -> tuple[wp.array, wp.array]:
