@@ -138,7 +138,7 @@ def test_summary_says_what_leaks_and_what_was_skipped(copy, capsys):
 
     lines = summary(viewcell.load(copy)).splitlines()
     assert lines[0] == "4 cells, 4 inhabitable (inside the model's 9 rooms)"
-    assert "the outside leaks in, through 3 cells: 3, 1, 2" in lines
+    assert "the outside leaks into the middle of the building, through cells 3, 1, 2" in lines
     assert lines[-5:-3] == ["skipped 5:", "  wall 0: no faces"] and lines[-1].startswith("  ...")
 
 
@@ -346,6 +346,7 @@ def test_a_full_disk_leaves_the_bake_alone(graph, copy, tmp_path, monkeypatch, c
     ("error", "code", "words"),
     [
         (MemoryError("Unable to allocate 9 TiB"), 2, "memory, found too little (Unable to allocate 9 TiB)"),
+        (RuntimeError("Failed to allocate 9 bytes on device 'cuda:0'"), 2, "on the device, found too little"),
         (PermissionError(errno.EACCES, "Permission denied", "x.bake"), 2, "x.bake: expected"),
         (KeyboardInterrupt(), 130, "interrupted; run the same command again to resume"),
         (viewcell.InputError("two\nlines"), 2, "two lines"),

@@ -41,6 +41,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         _complain(str(error))
     except MemoryError as error:
         _complain(f"expected enough memory, found too little{f' ({error})' if str(error) else ''}")
+    except RuntimeError as error:
+        # Warp's own way to say that a device's memory is full.
+        if "Failed to allocate" not in str(error):
+            raise
+        _complain(f"expected enough memory on the device, found too little ({error})")
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         _complain(f"{where}expected to be able to read and write, found {error.strerror or error}")
