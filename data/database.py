@@ -159,6 +159,11 @@ def _check_ids(bake: Bake) -> None:
                 bad = ids[(ids < 0) | (ids >= limits[column])][0]
                 where = bake.folder / f"{name}.parquet"
                 raise InputError(f"{where}: expected {column} from 0 to {limits[column] - 1}, found {bad}")
+        sources = table["cell_id"].to_numpy()
+        if not bake.graph.inhabitable[sources].all():
+            bad = sources[~bake.graph.inhabitable[sources]][0]
+            where = bake.folder / f"{name}.parquet"
+            raise InputError(f"{where}: expected rows of inhabitable cells only, found cell {bad}")
 
 
 def write_bake(
