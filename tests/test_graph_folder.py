@@ -92,6 +92,8 @@ def drop(table, name):
         (spoil("portals", "coordinate", 0, 0.25 + 1 / 64), "off the common face"),
         (spoil("portals", "max_u", 0, 9.0), "off the common face"),
         (spoil("portals", "max_u", 0, -9.0), "expected portals with area, found portal 0 without"),
+        (lambda _, portals: portals["cell_a"].__setitem__(0, portals["cell_b"][0]), "off the common face"),
+        (lambda _, portals: portals["cell_b"].__setitem__(0, portals["cell_a"][0]), "off the common face"),
         (drop("cells", "max_y"), "max_y"),
         (drop("portals", "axis"), "axis"),
         (lambda cells, _: cells.update(min_x=["a"] * len(cells["min_x"])), "expected numbers"),
