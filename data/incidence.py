@@ -37,58 +37,52 @@ def populate(scene: Scene, cells: np.ndarray) -> Incidence:
     triangles, owners = scene.triangles()
     starts = np.searchsorted(owners, np.arange(len(scene.objects) + 1))
     bounds = scene.object_bounds()
-    cell, object_id, boxes, whole = [], [], [], []
-    for index in range(len(scene.objects)):
-        part = triangles[starts[index] : starts[index + 1]]
-        if not len(part):
-            continue
+    cell, object_id, whole = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0, bool)]
+    for index in np.flatnonzero(np.diff(starts)):
         low, high = bounds[index]
         near = np.flatnonzero((cells[:, 0] <= high).all(axis=1) & (cells[:, 1] >= low).all(axis=1))
-        inside = (cells[near, 0] < low).all(axis=1) & (cells[near, 1] > high).all(axis=1)
-        if inside.any():
-            near, clipped = near[inside], bounds[index][None]
-        else:
-            near, clipped = _clip_to_cells(part, cells, near)
+        inside = (cells[near, 0] <= low).all(axis=1) & (cells[near, 1] >= high).all(axis=1)
         cell.append(near)
         object_id.append(np.full(len(near), index))
-        boxes.append(clipped)
-        whole.append(np.full(len(near), bool(inside.any())))
-    if not cell:
-        cell, object_id, boxes, whole = (
-            [np.zeros(0, int)],
-            [np.zeros(0, int)],
-            [np.zeros((0, 2, 3))],
-            [np.zeros(0, bool)],
-        )
-    rows = np.concatenate(cell)
-    order = np.argsort(rows, kind="stable")
+        whole.append(inside & (len(near) == 1))
+    rows, objects, within = (np.concatenate(column) for column in (cell, object_id, whole))
+    boxes = bounds[objects]
+    boxes[~within] = _clip_rows(triangles, starts, cells[rows[~within]], objects[~within])
+    kept = (boxes[:, 0] <= boxes[:, 1]).all(axis=1)
+    # Contact along a line or in a point shows nothing to an open set of sightlines.
+    kept &= (boxes[:, 1] > boxes[:, 0]).sum(axis=1) >= 2
+    order = np.flatnonzero(kept)
+    order = order[np.argsort(rows[order], kind="stable")]
     rows = rows[order].astype(np.int32)
     return Incidence(
         rows,
-        np.concatenate([np.zeros(0, int), *object_id])[order].astype(np.int32),
-        np.concatenate([np.zeros((0, 2, 3), int), *boxes])[order].astype(np.int32),
-        np.concatenate([np.zeros(0, bool), *whole])[order],
+        objects[order].astype(np.int32),
+        boxes[order].astype(np.int32),
+        within[order],
         np.searchsorted(rows, np.arange(len(cells) + 1)),
     )
 
 
-def _clip_to_cells(part: np.ndarray, cells: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Cells that hold surface of the triangles, and its bounds there."""
-    found = np.empty((len(near), 2, 3), np.int64)
+def _clip_rows(triangles: np.ndarray, starts: np.ndarray, cells: np.ndarray, objects: np.ndarray) -> np.ndarray:
+    """Bounds of each row's object inside the row's cell, shape (n, 2, 3), int64; low > high where nothing is there."""
+    found = np.empty((len(cells), 2, 3), np.int64)
     found[:, 0], found[:, 1] = 2**30, -(2**30)
-    low, high = part.min(axis=1), part.max(axis=1)
-    step = max(1, CHUNK // len(part))
-    for begin in range(0, len(near), step):
-        boxes = cells[near[begin : begin + step]]
-        overlap = (low[None] <= boxes[:, None, 1]).all(axis=2) & (high[None] >= boxes[:, None, 0]).all(axis=2)
-        which, t = np.nonzero(overlap)
-        ok, clipped = clip_bounds(part[t], boxes[which])
-        np.minimum.at(found[begin : begin + step, 0], which[ok], clipped[ok, 0])
-        np.maximum.at(found[begin : begin + step, 1], which[ok], clipped[ok, 1])
-    kept = (found[:, 0] <= found[:, 1]).all(axis=1)
-    # Contact along a line or in a point shows nothing to an open set of sightlines.
-    kept &= (found[:, 1] > found[:, 0]).sum(axis=1) >= 2
-    return near[kept], found[kept]
+    sizes = starts[objects + 1] - starts[objects]
+    ends = np.cumsum(sizes)
+    begin = 0
+    while begin < len(cells):
+        stop = max(begin + 1, int(np.searchsorted(ends, ends[begin] - sizes[begin] + CHUNK)))
+        part = sizes[begin:stop]
+        row = begin + np.repeat(np.arange(len(part)), part)
+        t = np.arange(len(row)) - np.repeat(np.cumsum(part) - part, part) + starts[objects[row]]
+        near = (triangles[t].min(axis=1) <= cells[row, 1]).all(axis=1)
+        near &= (triangles[t].max(axis=1) >= cells[row, 0]).all(axis=1)
+        row, t = row[near], t[near]
+        left, clipped = clip_bounds(triangles[t], cells[row])
+        np.minimum.at(found[:, 0], row[left], clipped[left, 0])
+        np.maximum.at(found[:, 1], row[left], clipped[left, 1])
+        begin = stop
+    return found
 
 
 def clip_bounds(triangles: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,15 +5,21 @@ Only closed elements count, each alone: an open ceiling would make everything un
 
 import numpy as np
 
-from .scene import Role, Scene
+from .scene import GRID_LIMIT, Role, Scene
+
+SHIFT = 2 * GRID_LIMIT
 
 
-def closed_elements(scene: Scene) -> list[tuple[int, np.ndarray]]:
-    """Opaque objects whose directed edges all pair off, as (object_id, triangles (m, 3, 3) int32)."""
+def closed_elements(scene: Scene, *roles: Role) -> list[tuple[int, np.ndarray]]:
+    """Objects of the roles (by default all opaque ones) whose directed edges all pair off.
+
+    Returns:
+        (object_id, triangles (m, 3, 3) int32) of each.
+    """
     triangles, owners = scene.triangles()
     starts = np.searchsorted(owners, np.arange(len(scene.objects) + 1))
     found = []
-    for object_id in np.flatnonzero(scene.object_mask(Role.OCCLUDER, Role.DETAIL)):
+    for object_id in np.flatnonzero(scene.object_mask(*(roles or (Role.OCCLUDER, Role.DETAIL)))):
         part = triangles[starts[object_id] : starts[object_id + 1]]
         if len(part) >= 4 and is_closed(part):
             found.append((int(object_id), part))
@@ -22,7 +28,10 @@ def closed_elements(scene: Scene) -> list[tuple[int, np.ndarray]]:
 
 def is_closed(triangles: np.ndarray) -> bool:
     """Whether every directed edge has its opposite, as often; triangles (m, 3, 3), int32, positions welded by value."""
-    _, corner = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    # Positions as single integers, exactly: x and y share 64 bits, and so do their rank and z.
+    x, y, z = triangles.reshape(-1, 3).T.astype(np.int64) + SHIFT
+    _, flat = np.unique(x * 2 * SHIFT + y, return_inverse=True)
+    _, corner = np.unique(flat * 2 * SHIFT + z, return_inverse=True)
     corner = corner.reshape(-1, 3).astype(np.int64)
     start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
     base = corner.max() + 1

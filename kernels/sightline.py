@@ -28,6 +28,8 @@ QUANTUM = wp.constant(wp.float64(1024.0))
 # Points drawn on an object before giving up that one falls into the wanted box.
 PICKS = wp.constant(64)
 NEAR_PICKS = wp.constant(6)
+# A witness on an object must hit it within this multiple of its length (the check grants 1.001).
+PROLONGED = wp.constant(wp.float64(1.0005))
 
 
 @wp.struct
@@ -93,6 +95,20 @@ def clears(p: wp.vec3d, q: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> b
     if above == 0:
         return False
     return above == certain_side(a - q, b - q, c - q)
+
+
+@wp.func
+def hits(p: wp.vec3d, q: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> bool:
+    """Whether the segment pq certainly crosses the inside of the triangle abc."""
+    d = q - p
+    u = a - p
+    v = b - p
+    w = c - p
+    s0 = certain_side(d, u, v)
+    if s0 == 0 or s0 != certain_side(d, v, w) or s0 != certain_side(d, w, u):
+        return False
+    above = certain_side(u, v, w)
+    return above != 0 and above == -certain_side(a - q, b - q, c - q)
 
 
 @wp.func
@@ -219,6 +235,7 @@ def _aim(
         found_out[row] = wp.uint8(0)
         owner = aims.owner[row]
         attempt = int(0)
+        chosen = int(0)
         recent = wp.vec4i(-1, -1, -1, -1)
         newest = int(0)
         while attempt < tries:
@@ -261,11 +278,13 @@ def _aim(
                         if distance < best:
                             best = distance
                             end = point
+                            chosen = low
                         wanted -= 1
                         if wanted == 0:
                             picks = PICKS
                 if best == f64(1.0e300):
                     end = point
+                    chosen = low
                 if attempt % 2 == 1:
                     origin = pull(origin, aims.hint_origin[row], f64(1.0) / f64(1 + attempt))
             origin = quantised(origin)
@@ -279,6 +298,12 @@ def _aim(
                     stopped = not clears(origin, end, real(scene.a[item]), real(scene.b[item]), real(scene.c[item]))
             if not stopped:
                 item = obstacle(scene, origin, end, owner)
+                if item < 0 and owner >= 0:
+                    # A point next to the object's edge: not sure to hit it when the sightline is prolonged a little.
+                    if not hits(
+                        origin, origin + (end - origin) * PROLONGED, real(a[chosen]), real(b[chosen]), real(c[chosen])
+                    ):
+                        continue
                 if item < 0:
                     found_out[row] = wp.uint8(1)
                     origins_out[row] = origin

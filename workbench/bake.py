@@ -194,8 +194,7 @@ def build_graph(scene: Scene, settings: Settings, clock: Clock) -> tuple[CellGra
     rooms = [[s.vertices.min(axis=0), s.vertices.max(axis=0)] for s in scene.spaces]
     boxes = np.round(np.array(rooms).reshape(-1, 2, 3) / scene.grid_m).astype(np.int64)
     cells = cut_rooms(merge(leaves, opaque), boxes)
-    solids = [solid for solid in closed_elements(scene) if occluders[solid[0]]]
-    dead = dead_cells(cells, solids)
+    dead = dead_cells(cells, closed_elements(scene, Role.OCCLUDER))
     clock.lap("subdivide")
     graph = find_portals(cells[~dead], opaque)
     inhabited = find_inhabitable(scene, graph)
