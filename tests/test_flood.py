@@ -28,7 +28,7 @@ def shared_graph(name):
 
 
 def model_of(graph):
-    return Engine(None, graph, seed=0, threads=1, device="cpu").model
+    return Engine(None, graph, None, seed=0, threads=1, device="cpu").model
 
 
 def flooded(model, sources=None, **options):
@@ -126,7 +126,7 @@ def test_shared_building():
 )
 def test_published_means(name, mean):
     graph = shared_graph(name)
-    engine = Engine(None, graph, seed=0, threads=2, device="cpu")
+    engine = Engine(None, graph, None, seed=0, threads=2, device="cpu")
     rows = engine.join([engine.visible(np.arange(graph.cell_count))])[0]
     assert round(len(rows.source) / graph.cell_count, 2) == mean
     assert rows.seen.mean() > 0.999
@@ -154,7 +154,7 @@ def test_rows_do_not_depend_on_the_cap(cap, monkeypatch):
     graph = shared_graph("w48")
 
     def rows():
-        engine = Engine(None, graph, seed=0, threads=1, device="cpu")
+        engine = Engine(None, graph, None, seed=0, threads=1, device="cpu")
         joined = engine.join([engine.visible(np.arange(graph.cell_count))])[0]
         return joined.source, joined.target, joined.seen
 
