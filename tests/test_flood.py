@@ -1,6 +1,7 @@
 """Portal-sequence flood and target search against an exact search in plain Python, on random and shared graphs."""
 
 import runpy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from viewcell.data.graph import OTHER_AXES
 from viewcell.data.graph_folder import read_graph
 from viewcell.kernels import engine as engines
 from viewcell.kernels import flood
-from viewcell.kernels.cell_visibility import accept, segments
+from viewcell.kernels.cell_visibility import accept, join_rows, segments
 from viewcell.kernels.engine import Engine
 from viewcell.kernels.flood import launch_flood
 from viewcell.kernels.target import TargetAnswers, launch_target_search
@@ -173,3 +174,27 @@ def test_threads_and_chunks_change_nothing(monkeypatch):
     for other in (two, chunked):
         for name in one.__dataclass_fields__:
             np.testing.assert_array_equal(getattr(other, name), getattr(one, name), err_msg=name)
+
+
+def test_joined_rows_are_symmetric():
+    """What one side hides is hidden from the other too, and one witness serves both sides."""
+    graph, _ = BUILDINGS["random_graph"](0, walls=4)
+    engine = Engine(None, graph, None, seed=0, threads=1, device="cpu")
+    part = engine.visible(np.arange(graph.cell_count)).cells
+    pairs = np.column_stack([part.source, part.target])
+    others = np.flatnonzero((part.source != part.target) & part.seen)
+    hidden, unseen = pairs[others[0]].tolist(), pairs[others[-1]].tolist()
+    row = int(others[-1])
+    part.seen[row] = False
+    keep = ~(pairs == hidden).all(axis=1)
+    names = ("source", "target", "seen", "origin", "end", "portal_counts")
+    rows = join_rows(engine.model, [replace(part, **{name: getattr(part, name)[keep] for name in names})])
+    joined = list(zip(rows.source.tolist(), rows.target.tolist(), strict=True))
+    assert tuple(hidden) not in joined and tuple(hidden[::-1]) not in joined
+    assert len(joined) == len(pairs) - 2
+    place, back = joined.index(tuple(unseen)), int(np.flatnonzero((pairs == unseen[::-1]).all(axis=1))[0])
+    assert rows.seen[place]
+    np.testing.assert_array_equal(rows.origin[place], part.end[back])
+    np.testing.assert_array_equal(rows.end[place], part.origin[back])
+    portals = rows.portals[rows.portal_starts[place] : rows.portal_starts[place + 1]]
+    assert (graph.portal_cells[portals[0]] == unseen[0]).any() and (graph.portal_cells[portals[-1]] == unseen[1]).any()
