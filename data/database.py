@@ -5,6 +5,7 @@ A witness is the sightline from `origin_*` to `origin_* + direction_*`.
 """
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -168,7 +169,7 @@ def _check_ids(bake: Bake) -> None:
 
 def write_bake(
     folder: Path,
-    manifest: dict,
+    manifest: Callable[[], dict],
     scene: Scene | None,
     graph: CellGraph,
     cell_rows: VisibleRows,
@@ -176,6 +177,8 @@ def write_bake(
     grid_m: float,
 ) -> Bake:
     """Write a bake folder atomically: a temporary folder beside the target, then a rename.
+
+    The manifest is asked for when the tables are written, so that it can tell how long that took.
 
     Raises:
         InputError: the disk is full or the place is not writable; what was there before is untouched.
@@ -193,8 +196,9 @@ def write_bake(
     with new_folder(folder, kind="bake") as temporary:
         for name, table in tables.items():
             pq.write_table(table, temporary / f"{name}.parquet", compression="zstd")
-        (temporary / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
-    return Bake(folder, manifest)
+        final = manifest()
+        (temporary / "manifest.json").write_text(json.dumps(final, indent=1) + "\n", encoding="utf-8")
+    return Bake(folder, final)
 
 
 def _cells_table(graph: CellGraph, grid_m: float) -> pa.Table:
@@ -222,7 +226,7 @@ def _portals_table(graph: CellGraph, grid_m: float) -> pa.Table:
 
 
 def _witness_columns(rows: VisibleRows, grid_m: float) -> dict[str, pa.Array]:
-    # The grid step is a power of two, so metres hold the same point; the difference of two such points is exact too.
+    # The grid step is a power of two, so metres hold the same points, and both ends are multiples of a 1024th of it.
     values = np.concatenate([rows.origin * grid_m, rows.end * grid_m - rows.origin * grid_m], axis=1)
     return {name: pa.array(values[:, i], mask=~rows.seen) for i, name in enumerate(WITNESS)}
 

@@ -117,6 +117,8 @@ def read_table(path: Path, columns: tuple[str, ...]) -> pa.Table:
     Raises:
         InputError: it is missing, unreadable, or lacks a column.
     """
+    if not path.is_file():
+        raise InputError(f"{path}: expected a Parquet table, found nothing there")
     try:
         table = pq.read_table(path)
     except (OSError, pa.ArrowException) as error:

@@ -15,6 +15,8 @@ from .walk import launch_walk
 
 # Sightlines aimed at a pair that the axial model allows but whose own line the true triangles block, a round each.
 AIM_ROUNDS = (16, 64, 256)
+# A pair whose clear sightlines were refused is shot at so many times more a round, anywhere.
+REFUSED_AGAIN = 3
 # Lines tried for a pair, then again for what stayed undecided.
 CAPS = (200, 20_000)
 
@@ -222,8 +224,13 @@ def _aim(
 ) -> None:
     """Shoot at pairs that have no witness yet; fills origin, end and seen in place."""
     cells = model.graph.cells
+    refused = np.zeros(len(source), bool)
     for number, tries in enumerate(AIM_ROUNDS):
         rows = np.flatnonzero(~seen)
+        # A line on a seam between portals is clear and still no witness, and so is everything near it.
+        again = rows[refused[rows]]
+        copy = np.repeat(np.arange(1 + REFUSED_AGAIN), [len(rows), *[len(again)] * REFUSED_AGAIN])
+        rows = np.concatenate([rows, *[again] * REFUSED_AGAIN])
         hints = np.stack([origin[rows], end[rows]], axis=1)
         hintless = (hints == 0).all(axis=(1, 2))
         hints[hintless] = cells[np.stack([source[rows], target[rows]], axis=1)][hintless].mean(axis=2)
@@ -235,21 +242,22 @@ def _aim(
             hints,
             np.full(len(rows), -1),
             np.zeros((len(rows), 2), int),
-            seeds(model.seed + number, source[rows], target[rows]),
+            seeds(model.seed + number + 1000 * copy, source[rows], target[rows]),
+            ~refused[rows],
             tries=tries,
             threads=model.threads,
             device=model.device,
         )
         hit = np.flatnonzero(found)
+        refused[rows[hit]] = True
         good = hit[accept(model, source[rows[hit]], target[rows[hit]], first[hit], last[hit])]
         origin[rows[good]], end[rows[good]], seen[rows[good]] = first[good], last[good], True
 
 
-def seeds(seed: int, source: np.ndarray, target: np.ndarray) -> np.ndarray:
+def seeds(seed: int | np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
     """A random stream for each pair that depends on nothing else, shape (n,), int32."""
-    mixed = (
-        source.astype(np.uint64) * 0x9E3779B1 + target.astype(np.uint64) * 0x85EBCA77 + seed * 0xC2B2AE3D
-    ) & 0x7FFFFFFF
+    mixed = source.astype(np.uint64) * 0x9E3779B1 + target.astype(np.uint64) * 0x85EBCA77
+    mixed = (mixed + np.asarray(seed, np.uint64) * np.uint64(0xC2B2AE3D)) & np.uint64(0x7FFFFFFF)
     return mixed.astype(np.int32)
 
 

@@ -56,7 +56,6 @@ class Engine:
             threads: CPU threads.
             device: Warp device.
         """
-        wp.config.quiet = True
         self.objects = None
         self.object_count = 0
         triangles = targets = solids = opaque_rectangles = None

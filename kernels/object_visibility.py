@@ -155,6 +155,7 @@ def _aim(
         target,
         objects.ranges[target],
         seeds(model.seed + 101 * (number + 1), source, streams),
+        np.full(len(pairs), number > 0),
         tries=tries,
         boxed=number > 0,
         threads=model.threads,

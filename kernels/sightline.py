@@ -172,12 +172,11 @@ def _confirm(
 
 
 @wp.func
-def random_point(state: wp.uint32, lo: wp.vec3d, hi: wp.vec3d) -> wp.vec3d:
-    """Uniform point of a box, kept off its faces by 1/64 of its size."""
+def point_at(lo: wp.vec3d, hi: wp.vec3d, share: wp.vec3d) -> wp.vec3d:
+    """Point of a box at shares 0 to 1 of its sides, kept off its faces by 1/64 of its size."""
     out = wp.vec3d()
     for i in range(3):
-        share = f64(0.015625) + f64(0.96875) * f64(wp.randf(state))
-        out[i] = lo[i] + share * (hi[i] - lo[i])
+        out[i] = lo[i] + (f64(0.015625) + f64(0.96875) * share[i]) * (hi[i] - lo[i])
     return out
 
 
@@ -204,6 +203,7 @@ class Aims:
     begin: wp.array(dtype=int)
     end: wp.array(dtype=int)
     seed: wp.array(dtype=int)
+    near: wp.array(dtype=int)
 
 
 @wp.func
@@ -234,25 +234,27 @@ def _aim(
         state = wp.rand_init(aims.seed[row])
         found_out[row] = wp.uint8(0)
         owner = aims.owner[row]
+        near = aims.near[row]
         attempt = int(0)
         chosen = int(0)
         recent = wp.vec4i(-1, -1, -1, -1)
         newest = int(0)
         while attempt < tries:
-            origin = random_point(state, real(aims.source_lo[row]), real(aims.source_hi[row]))
+            # Drawn here, not in a function: a function would advance a copy of the random state.
+            share = wp.vec3d(f64(wp.randf(state)), f64(wp.randf(state)), f64(wp.randf(state)))
+            origin = point_at(real(aims.source_lo[row]), real(aims.source_hi[row]), share)
             end = wp.vec3d()
             if owner < 0:
-                end = random_point(state, real(aims.target_lo[row]), real(aims.target_hi[row]))
-                # Every other attempt stays near the line that the axial model allows, nearer and nearer.
-                if attempt % 2 == 1:
+                share = wp.vec3d(f64(wp.randf(state)), f64(wp.randf(state)), f64(wp.randf(state)))
+                end = point_at(real(aims.target_lo[row]), real(aims.target_hi[row]), share)
+                if near == 1 and attempt % 2 == 1:
                     reach = f64(1.0) / f64(1 + attempt)
                     origin = pull(origin, aims.hint_origin[row], reach)
                     end = pull(end, aims.hint_end[row], reach)
             else:
                 # Odd attempts stay near the line that the axial model allows: of several points the nearest to its end.
-                near = boxed == 1 and attempt % 2 == 1
                 wanted = int(1)
-                if near:
+                if near == 1 and attempt % 2 == 1:
                     wanted = NEAR_PICKS
                 best = f64(1.0e300)
                 picks = int(0)
@@ -285,7 +287,7 @@ def _aim(
                 if best == f64(1.0e300):
                     end = point
                     chosen = low
-                if attempt % 2 == 1:
+                if near == 1 and attempt % 2 == 1:
                     origin = pull(origin, aims.hint_origin[row], f64(1.0) / f64(1 + attempt))
             origin = quantised(origin)
             end = quantised(end)
@@ -379,6 +381,7 @@ def launch_aim(
     owners: np.ndarray,
     ranges: np.ndarray,
     seeds: np.ndarray,
+    near: np.ndarray,
     *,
     tries: int,
     boxed: bool = False,
@@ -396,6 +399,7 @@ def launch_aim(
         owners: object to hit, or -1 to reach a point of the target box.
         ranges: the object's first and past-the-last row in `targets`, shape (n, 2), int.
         seeds: of each row's random stream, shape (n,), int.
+        near: rows whose every other sightline stays near the hint, nearer and nearer, shape (n,), bool.
         tries: sightlines shot a row at most.
         boxed: aim only at the part of the object inside the row's box (most of the time: a part that random points on
             the object rarely hit is given up, and the point is used as it is).
@@ -412,7 +416,13 @@ def launch_aim(
     aims.hint_origin, aims.hint_end = (
         wp.array(np.ascontiguousarray(hints[:, i], np.float64), dtype=wp.vec3d, device=device) for i in (0, 1)
     )
-    for name, values in (("owner", owners), ("begin", ranges[:, 0]), ("end", ranges[:, 1]), ("seed", seeds)):
+    for name, values in (
+        ("owner", owners),
+        ("begin", ranges[:, 0]),
+        ("end", ranges[:, 1]),
+        ("seed", seeds),
+        ("near", near),
+    ):
         setattr(aims, name, wp.array(np.ascontiguousarray(values, np.int32), dtype=int, device=device))
     found = wp.zeros(count, dtype=wp.uint8, device=device)
     origins, ends = (wp.zeros(count, dtype=wp.vec3d, device=device) for _ in range(2))

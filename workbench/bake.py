@@ -77,7 +77,8 @@ def bake(
         model: a scene, a model file, a scene folder, or a folder with only cells.parquet and portals.parquet.
         out: bake folder to write; by default `<model>.bake` in the current folder.
         settings: what the answer depends on.
-        budget_s: stop refining after so many seconds of visibility; what is left is unknown, never hidden.
+        budget_s: stop after so many seconds of visibility; what is left is unknown, never hidden, and baking again
+            goes on from there.
         threads: CPU threads; all cores by default. The answer does not depend on it.
         device: Warp device. The answer does not depend on it.
         overwrite: replace a finished bake at `out` even if it is up to date.
@@ -91,14 +92,14 @@ def bake(
     """
     settings = settings or Settings()
     _check(settings, budget_s, threads, device)
+    out = Path(out) if out is not None else Path(f"{_name(model)}.bake")
+    clock = Clock()
     scene, graph_folder = _open(model, settings)
-    out = Path(out or Path(_name(model, scene)).with_suffix(".bake").name)
     if out.exists() and not replaceable(out, "bake"):
         raise InputError(f"{out}: expected a new name or a bake folder to replace, found something else there")
     print_ = _fingerprint(scene, graph_folder, settings)
-    if not overwrite and (done := _finished(out, print_)) is not None and budget_s is None:
+    if not overwrite and (done := _finished(out, print_)) is not None:
         return done
-    clock = Clock()
     if scene is None:
         graph, snapped = read_graph(graph_folder)
         opaque = None
@@ -111,12 +112,17 @@ def bake(
         facts |= notes
     if not graph.inhabitable.any():
         raise InputError(f"{facts['source']}: expected at least one inhabitable cell, found none")
-    cell_rows, object_rows = _visibility(
+    cell_rows, object_rows, spent = _visibility(
         scene, graph, opaque, settings, out, print_, clock, budget_s, threads, device, progress
     )
-    manifest = _manifest(facts, settings, print_, graph, cell_rows, object_rows, clock)
+    facts["budget_spent"] = spent
+
+    def manifest() -> dict:
+        return _manifest(facts, settings, print_, graph, cell_rows, object_rows, clock)
+
     made = write_bake(out, manifest, scene, graph, cell_rows, object_rows, facts["grid_m"])
-    shutil.rmtree(_partial(out), ignore_errors=True)
+    if not spent:
+        shutil.rmtree(_partial(out), ignore_errors=True)
     return made
 
 
@@ -133,6 +139,8 @@ def _check(settings: Settings, budget_s: float | None, threads: int | None, devi
         raise InputError(f"seal: expected 0 (closing cracks is not built yet), found {settings.seal}")
     import warp as wp
 
+    # Warp greets whoever starts it, unless told not to before.
+    wp.config.log_level = wp.LOG_WARNING
     try:
         wp.get_device(device)
     except Exception as error:  # Warp raises several types for an unknown or absent device
@@ -143,6 +151,8 @@ def _open(model: Scene | str | Path, settings: Settings) -> tuple[Scene | None, 
     if isinstance(model, Scene):
         return model, None
     path = Path(model)
+    if path.is_dir() and settings.doors != "open":
+        raise InputError(f"{path}: expected a model file to close the doors of, found a folder")
     if path.is_dir() and not (path / "manifest.json").exists():
         return None, path
     from ..data.readers import read
@@ -150,8 +160,9 @@ def _open(model: Scene | str | Path, settings: Settings) -> tuple[Scene | None, 
     return read(path, doors=settings.doors), None
 
 
-def _name(model: Scene | str | Path, scene: Scene | None) -> str:
-    return str(model) if not isinstance(model, Scene) else scene.source.split()[-1] if scene.source else "scene"
+def _name(model: Scene | str | Path) -> str:
+    # `resolve` gives "." and ".." a name.
+    return "scene" if isinstance(model, Scene) else Path(model).resolve().stem or "model"
 
 
 def _fingerprint(scene: Scene | None, graph_folder: Path | None, settings: Settings) -> str:
@@ -226,8 +237,11 @@ def _visibility(
     threads: int | None,
     device: str,
     progress: bool,
-) -> tuple[VisibleRows, VisibleRows]:
-    """Visibility of all inhabitable cells, block by block; finished blocks are kept beside the target."""
+) -> tuple[VisibleRows, VisibleRows, bool]:
+    """Visibility of all inhabitable cells, block by block, and whether the budget ended it early.
+
+    Finished blocks are kept beside the target.
+    """
     from ..kernels.engine import Engine
     from ..kernels.launch import thread_count
 
@@ -239,12 +253,13 @@ def _visibility(
     blocks = [sources[i : i + BLOCK] for i in range(0, len(sources), BLOCK)] if scene is not None else [sources]
     store = _Store(_partial(out), print_)
     deadline = None if budget_s is None else time.perf_counter() + budget_s
-    parts = []
+    parts, spent = [], False
     bar = tqdm(total=len(sources), unit="cell", desc="visibility", disable=not progress)
     for number, block in enumerate(blocks):
         part = store.load(number)
         if part is None:
             late = deadline is not None and time.perf_counter() > deadline
+            spent |= late
             part = engine.unknown(block) if late else engine.visible(block)
             if not late:
                 store.save(number, part)
@@ -252,7 +267,7 @@ def _visibility(
         bar.update(len(block))
     bar.close()
     clock.lap("flood")
-    return engine.join(parts)
+    return *engine.join(parts), spent
 
 
 class _Store:
