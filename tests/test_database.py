@@ -45,7 +45,7 @@ def made(folder):
     manifest |= {"unit": "metre", "source": "small house", "sha256": "", "skipped": []}
     manifest |= {"settings": {}, "counts": counts, "seconds": {}, "complete": True}
     rows = rows_of([0, 2, 4], True), rows_of([3, 1, 17], False)
-    return write_bake(folder, manifest, scene, graph, *rows, GRID_M), scene, graph
+    return write_bake(folder, lambda: manifest, scene, graph, *rows, GRID_M), scene, graph
 
 
 def test_columns_are_those_of_format_1(tmp_path):
