@@ -17,6 +17,7 @@ from .solids import winding_numbers
 
 SMALLEST_SIDE_M = 0.3
 SMALLEST_ROOM_M3 = 5.0
+SEALED_SHARE = 0.5
 SHUT_MARGIN_M = 0.01
 # Sample points an axis when a cell's share of the rooms is estimated.
 SAMPLES = 4
@@ -53,10 +54,14 @@ def find_inhabitable(scene: Scene, graph: CellGraph) -> Inhabited:
     mask = enclosed & roomy
     if mask.any():
         return Inhabited(mask, names, "not reached from outside when doors, windows and voids are shut", leak)
-    # The building's own box: the outermost cells hold the margin and are never rooms.
-    inner = (graph.cells[:, 0] > graph.cells[:, 0].min(axis=0)).all(axis=1)
+    # The building's own box: the outermost cells hold the margin and are never rooms. A cell that no portal leaves is
+    # the inside of something.
+    inner = np.bincount(graph.portal_cells.ravel(), minlength=graph.cell_count) > 0
+    inner &= (graph.cells[:, 0] > graph.cells[:, 0].min(axis=0)).all(axis=1)
     inner &= (graph.cells[:, 1] < graph.cells[:, 1].max(axis=0)).all(axis=1)
-    reason = "the model names no rooms and the outside leaks into all of it: every cell that does not touch the margin"
+    if not (roomy & inner).any():
+        inner[:] = True
+    reason = "the model names no rooms and the outside leaks into all of it: every roomy cell inside the margin"
     return Inhabited(roomy & inner, names, reason, leak)
 
 
@@ -84,9 +89,7 @@ def _rooms_of(scene: Scene, graph: CellGraph, roomy: np.ndarray) -> np.ndarray:
 
 
 def _flood(scene: Scene, graph: CellGraph) -> tuple[np.ndarray, list[int]]:
-    """Cells in components of room size that the outside does not reach, and a leak path if there is one."""
-    if graph.portal_count == 0:
-        return np.zeros(graph.cell_count, bool), []
+    """Cells in components of room size that only a shut opening joins to the rest, and a leak path if there is one."""
     shut = np.zeros(graph.portal_count, bool)
     margin = SHUT_MARGIN_M / scene.grid_m
     for low, high in scene.openings / scene.grid_m:
@@ -98,6 +101,16 @@ def _flood(scene: Scene, graph: CellGraph) -> tuple[np.ndarray, list[int]]:
     volume = np.prod((graph.cells[:, 1] - graph.cells[:, 0]) * scene.grid_m, axis=1)
     big = np.bincount(component, volume) >= SMALLEST_ROOM_M3
     enclosed = big[component] & (component != component[outside])
+    # The inside of walls and pillars of an open mesh is enclosed too. No opening leads into it; and where the model has
+    # no openings to tell by, it is a small share of the building.
+    opened = np.zeros(len(big), bool)
+    opened[component[graph.portal_cells[shut].ravel()]] = True
+    if shut.any():
+        enclosed &= opened[component]
+    else:
+        inner = (graph.cells[:, 0] > graph.cells[:, 0].min(axis=0)).all(axis=1)
+        inner &= (graph.cells[:, 1] < graph.cells[:, 1].max(axis=0)).all(axis=1)
+        enclosed &= volume[enclosed].sum() > SEALED_SHARE * volume[inner].sum()
     return enclosed, _leak_path(graph, links + links.T, outside, component)
 
 

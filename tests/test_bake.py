@@ -130,7 +130,6 @@ def test_resuming_equals_never_stopping(lost, office, office_bake, tmp_path, mon
     assert [path.name for path in tmp_path.iterdir()] == ["office"]
 
 
-@pytest.mark.xfail(reason="a stored block does not say which sources it holds", strict=False)
 def test_blocks_of_another_size_are_not_taken_for_ours(office, office_bake, tmp_path, monkeypatch):
     """What an older version left behind may be cut into blocks differently."""
     monkeypatch.setattr(baking, "BLOCK", 3)

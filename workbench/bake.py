@@ -167,16 +167,20 @@ def _name(model: Scene | str | Path) -> str:
 
 def _fingerprint(scene: Scene | None, graph_folder: Path | None, settings: Settings) -> str:
     """Hash of everything that the answer depends on."""
-    digest = hashlib.sha256(f"{__version__} {settings}".encode())
+    digest = hashlib.sha256(f"{__version__} {settings} {BLOCK}".encode())
     if scene is None:
         for name in ("cells.parquet", "portals.parquet"):
             path = graph_folder / name
             digest.update(path.read_bytes() if path.is_file() else b"")
     else:
-        for array in (*scene.triangles(), scene.object_mask(Role.OCCLUDER), scene.object_mask(Role.DETAIL)):
-            digest.update(np.ascontiguousarray(array).tobytes())
+        for shape in scene.definitions:
+            for mesh in shape.lods:
+                digest.update(mesh.vertices.tobytes() + mesh.faces.tobytes() + repr(mesh.error_m).encode())
+        for placed in scene.objects:
+            digest.update(repr((placed.name, placed.kind, placed.definition_id, placed.role)).encode())
+            digest.update(placed.transform.tobytes())
         for space in scene.spaces:
-            digest.update(space.vertices.tobytes())
+            digest.update(space.name.encode() + space.vertices.tobytes() + space.faces.tobytes())
         digest.update(np.ascontiguousarray(scene.openings).tobytes())
         digest.update(repr((scene.grid_m, scene.origin.tolist())).encode())
     return digest.hexdigest()
@@ -288,7 +292,7 @@ class _Store:
         """A finished block, or None."""
         try:
             return pickle.loads((self._folder / f"{number}.block").read_bytes())
-        except (OSError, pickle.UnpicklingError, EOFError):
+        except Exception:  # pickle raises many types for a damaged file; the block is then computed again
             return None
 
     def save(self, number: int, part: object) -> None:
