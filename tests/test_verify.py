@@ -70,8 +70,10 @@ def test_a_true_bake_stands(house):
 
 def test_a_true_bare_graph_stands(bare):
     result = verify(bare, rays=RAYS)
-    assert result.ok and result.embree_rate == 0 and result.rate_ratio == 0
-    assert result.counts[1].by_rays == result.counts[1].potential
+    assert result.ok and not result.embree_rates and result.rate_ratio == 0
+    assert result.cell_rays == result.rays
+    # Cell 1 shows itself to one ray in 20,000 from cell 5.
+    assert result.counts[1].by_rays >= result.counts[1].potential - 1
 
 
 def test_same_seed_same_findings(house):

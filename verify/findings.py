@@ -1,5 +1,6 @@
 """What a check of a bake found, and how its pairs are counted."""
 
+import statistics
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,9 +49,11 @@ class VerifyResult:
     """What `verify` found.
 
     Attributes:
-        rays: cast.
+        rays: cast; every one is checked for the object that it hits.
+        cell_rays: those that are also walked through the cells they cross.
         rays_per_second: while casting, walking and judging; compiling and building excluded.
-        embree_rate: Embree alone on the same rays and threads; 0 for a bare graph, which has no triangles.
+        embree_rates: rays a second of this check and of Embree alone, on the same rays and threads, one pair for each
+            part of the run; none for a bare graph, which has no triangles.
         wrong_hidden: hidden pairs that an exactly adjudicated sightline shows; the run stops at the first.
         case: the case file written for it.
         grazes: candidate rays that only touch an edge, a vertex or a boundary.
@@ -64,8 +67,9 @@ class VerifyResult:
     """
 
     rays: int = 0
+    cell_rays: int = 0
     rays_per_second: float = 0.0
-    embree_rate: float = 0.0
+    embree_rates: list[tuple[float, float]] = field(default_factory=list)
     wrong_hidden: int = 0
     case: Path | None = None
     grazes: int = 0
@@ -89,19 +93,19 @@ class VerifyResult:
 
     @property
     def rate_ratio(self) -> float:
-        """Rays a second over Embree's own; 0 for a bare graph."""
-        return self.rays_per_second / self.embree_rate if self.embree_rate else 0.0
+        """Rays a second over Embree's own, the median over the run; 0 for a bare graph."""
+        return statistics.median(ours / own for ours, own in self.embree_rates) if self.embree_rates else 0.0
 
     def table(self) -> str:
         """The result as two Markdown tables."""
-        ratio = f" ({self.rate_ratio:.0%} of Embree's own)" if self.embree_rate else ""
+        ratio = f" ({self.rate_ratio:.0%} of Embree's own)" if self.embree_rates else ""
         witnesses = [
             f"{found.confirmed:,} confirmed, {found.refuted:,} refuted"
             for found in (self.cell_witnesses, self.object_witnesses)
         ]
         rows = [
             ("wrong-hidden", f"{self.wrong_hidden}" + (f" (case file {self.case})" if self.case else "")),
-            ("rays", f"{self.rays:,}"),
+            ("rays, for objects / for cells", f"{self.rays:,} / {self.cell_rays:,}"),
             ("rays a second", f"{self.rays_per_second:,.0f}{ratio}"),
             ("grazes", f"{self.grazes:,}"),
             ("leaks narrower than the seal", f"{self.leaks:,}"),

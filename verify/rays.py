@@ -13,55 +13,80 @@ import warp as wp
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
-from .aims import ORIGINS_MOST
-from .walk import Links, Maze, Sightings, walk_rays
+from .walk import ROUNDS, Links, Maze, Sightings, walk_rays
+
+wp.set_module_options({"enable_backward": False})
 
 CANDIDATE_CAPACITY = 4096
-ORIGINS = wp.constant(ORIGINS_MOST)
 # One ray in this many is also cast at the transparent triangles.
 GLASS_SHARE = 8
+# Steps of Roberts' R2 sequence.
+R2 = np.array([0.7548776662466927, 0.5698402909980532])
+# Of five rounds through a cell's origins three are stratified. Only the first three are walked through the cells: the
+# walk of all would take verify below 70 % of Embree's rate, and cells are met far more often than small objects.
+AT_FRONTIER = wp.constant(2)
+AT_OBJECTS = wp.constant(4)
+WALKED_ROUNDS = 3
+
+
+@wp.struct
+class Aims:
+    """What rays of every row start from and are aimed at; see `Caster`."""
+
+    spots: wp.array2d[wp.vec3]
+    spot_counts: wp.array[int]
+    turns: wp.array[wp.mat33]
+    objects: wp.array[wp.vec3]
+    object_starts: wp.array[int]
+    frontier: wp.array2d[wp.vec3]
 
 
 @wp.kernel
 def aim_rays(
-    seed: int, first: int, spots: wp.array3d[float], spot_counts: wp.array[int], aims: wp.array2d[float],
-    frontier: wp.array3d[float], origins_out: wp.array2d[float], directions_out: wp.array2d[float],
+    aims: Aims, lattice: wp.array[wp.vec3], first: int,
+    origins_out: wp.array[wp.vec3], directions_out: wp.array[wp.vec3],
 ):  # fmt: skip
-    """Rays `first` and following of every row: origins in turn, directions from a shifted lattice or at an aim.
+    """Rays `first` and following of a row: origins in turn, directions from the row's turned lattice or at an aim.
 
-    Of five rays three are stratified, one is aimed at an object and one just beyond the potentially visible set.
-
-    The lattice is Roberts' R2 sequence, mapped to the sphere by equal areas, shifted at random for every origin.
+    Of five rounds through the origins three are stratified, one is aimed just beyond the potentially visible set and
+    one at objects.
     """
-    ray = wp.tid()
-    rows = spot_counts.shape[0]
-    run = origins_out.shape[0] // rows
-    row = ray // run
-    number = first + ray % run
-    spot = number % spot_counts[row]
-    turn = number // spot_counts[row]
-    o = wp.vec3(spots[row, spot, 0], spots[row, spot, 1], spots[row, spot, 2])
-    # One stream a ray for its aim, one an origin for the shift of its lattice.
-    state = wp.rand_init(seed, row * 1048573 + number)
-    d = wp.vec3()
-    if turn % 5 == 3 and aims.shape[0] > 0:
-        aim = wp.randi(state, 0, aims.shape[0])
-        d = wp.normalize(wp.vec3(aims[aim, 0], aims[aim, 1], aims[aim, 2]) - o)
-    if turn % 5 == 4 and frontier.shape[1] > 0:
-        aim = wp.randi(state, 0, frontier.shape[1])
-        d = wp.normalize(wp.vec3(frontier[row, aim, 0], frontier[row, aim, 1], frontier[row, aim, 2]) - o)
-    if wp.length(d) < 0.5:
-        shift = wp.rand_init(seed + 1, row * ORIGINS + spot)
-        # R2's two steps as 32-bit fractions: the wrap-around is the lattice's modulo.
-        u = wp.randu(shift) + wp.uint32(turn) * wp.uint32(3242174889)
-        v = wp.randu(shift) + wp.uint32(turn) * wp.uint32(2447445414)
-        height = float(v) * (2.0 / 4294967296.0) - 1.0
-        angle = float(u) * (2.0 * wp.pi / 4294967296.0)
-        radius = wp.sqrt(wp.max(0.0, 1.0 - height * height))
-        d = wp.vec3(radius * wp.cos(angle), radius * wp.sin(angle), height)
-    for axis in range(3):
-        origins_out[ray, axis] = o[axis]
-        directions_out[ray, axis] = d[axis]
+    row = wp.tid()
+    run = lattice.shape[0]
+    count = aims.spot_counts[row]
+    spot = first % count
+    round = first // count
+    turn = aims.turns[row]
+    start = aims.object_starts[row]
+    for k in range(run):
+        o = aims.spots[row, spot]
+        d = wp.vec3()
+        kind = round % ROUNDS
+        # Points to aim at are in random order: taken in turn they are even, and near in memory. The round shifts them,
+        # so that an origin does not always get the same ones.
+        place = (round // ROUNDS) * (count + 1) + spot
+        if kind == AT_OBJECTS and aims.objects.shape[0] > 0:
+            d = wp.normalize(aims.objects[(start + place) % aims.objects.shape[0]] - o)
+        if kind == AT_FRONTIER and aims.frontier.shape[1] > 0:
+            d = wp.normalize(aims.frontier[row, place % aims.frontier.shape[1]] - o)
+        if wp.dot(d, d) < 0.5:
+            d = turn * lattice[k]
+        origins_out[row * run + k] = o
+        directions_out[row * run + k] = d
+        spot = (spot + 1) % count
+        if spot == 0:
+            round += 1
+
+
+def lattice_points(first: int, count: int) -> np.ndarray:
+    """Unit vectors `first` and following of an even sequence on the sphere, shape (count, 3), float32.
+
+    Roberts' R2 sequence, mapped to the sphere by equal areas.
+    """
+    u, v = ((np.arange(first, first + count)[:, None] + 0.5) * R2 % 1.0).T
+    height, angle = 2 * v - 1, 2 * np.pi * u
+    radius = np.sqrt(np.maximum(0.0, 1 - height * height))
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height]).astype(np.float32)
 
 
 @dataclass
@@ -124,28 +149,45 @@ class Caster:
         self.seen_cells[np.arange(len(self.sources)), self.sources] = 1
         self._lock = threading.Lock()
         self._scene, self._glass_scene = embree_scene(self.opaque[0]), embree_scene(self.glass[0])
-        spots = np.zeros((len(self.spots), max(map(len, self.spots)), 3), np.float32)
-        for row, own in enumerate(self.spots):
-            spots[row, : len(own)] = own
-        self._aim = (_share(spots), _share(np.array([len(own) for own in self.spots], np.int32)))
-        self._aim += (_share(self.aims), _share(self.frontier))
-        self._maze, self._marks = Maze(), Sightings()
-        self._maze.boxes = _share(self.boxes.reshape(-1, 6).astype(np.float64))
-        for name in ("starts", "cells", "rectangles", "portals"):
+        self._aims, self._maze, self._marks = self._make_aims(), Maze(), Sightings()
+        self._buffers = threading.local()
+        self._maze.boxes = _share(np.ascontiguousarray(self.boxes.reshape(-1, 6), np.int32))
+        for name in ("starts", "cells", "rectangles"):
             setattr(self._maze, name, _share(getattr(self.links, name)))
         for name, table in (("cells", self.seen_cells), ("objects", self.seen_objects)):
             setattr(self._marks, name, _share(table))
         for name in ("potential_cells", "potential_objects"):
             setattr(self._marks, name, _share(np.ascontiguousarray(getattr(self, name))))
+        self._walked = WALKED_ROUNDS if self._scene is not None else ROUNDS
         self._owners = _share(self.opaque[1].astype(np.int32) if len(self.opaque[1]) else np.zeros(1, np.int32))
         self._sources = _share(self.sources.astype(np.int32))
 
+    def _make_aims(self) -> Aims:
+        rng, rows = np.random.default_rng(self.seed), len(self.sources)
+        spots = np.zeros((rows, max(map(len, self.spots)), 3), np.float32)
+        for row, own in enumerate(self.spots):
+            spots[row, : len(own)] = own
+        turns = np.linalg.qr(rng.normal(size=(rows, 3, 3)))[0].astype(np.float32)
+        aims = Aims()
+        aims.spots, aims.frontier = (_share(points, wp.vec3) for points in (spots, self.frontier))
+        aims.spot_counts = _share(np.array([len(own) for own in self.spots], np.int32))
+        aims.turns, aims.objects = _share(turns, wp.mat33), _share(self.aims, wp.vec3)
+        aims.object_starts = _share(rng.integers(0, max(len(self.aims), 1), rows).astype(np.int32))
+        return aims
+
     def rays(self, first: int, run: int) -> tuple[np.ndarray, np.ndarray]:
-        """Rays first to first + run - 1 of every row: origins and directions, shape (rows * run, 3), float32."""
-        count = len(self.sources) * run
-        origins, directions = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
-        out = [_share(origins), _share(directions)]
-        wp.launch(aim_rays, count, inputs=[self.seed, first, *self._aim], outputs=out, device="cpu")
+        """Rays first to first + run - 1 of every row: origins and directions, shape (rows * run, 3), float32.
+
+        The arrays belong to the calling thread and are overwritten by its next call.
+        """
+        rows = len(self.sources)
+        if getattr(self._buffers, "count", -1) < rows * run:
+            self._buffers.count = rows * run
+            self._buffers.arrays = np.empty((rows * run, 3), np.float32), np.empty((rows * run, 3), np.float32)
+        origins, directions = (array[: rows * run] for array in self._buffers.arrays)
+        inputs = [self._aims, _share(lattice_points(first, run), wp.vec3), first]
+        out = [_share(origins, wp.vec3), _share(directions, wp.vec3)]
+        wp.launch(aim_rays, rows, inputs=inputs, outputs=out, device="cpu")
         return origins, directions
 
     def embree(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -160,9 +202,10 @@ class Caster:
         origins, directions = self.rays(first, run)
         reach, hits = self.embree(origins, directions)
         found, count = np.zeros((CANDIDATE_CAPACITY, 4), np.int32), np.zeros(1, np.int32)
-        rays = [_share(origins), _share(directions), _share(reach)]
-        inputs = [self._maze, self._sources, *rays, self._owners, _share(hits), self._marks]
-        wp.launch(walk_rays, len(origins), inputs=inputs, outputs=[_share(found), _share(count)], device="cpu")
+        rays = [_share(origins, wp.vec3), _share(directions, wp.vec3), _share(reach)]
+        rounds = [self._aims.spot_counts, first, self._walked]
+        inputs = [self._maze, self._sources, run, *rounds, *rays, self._owners, _share(hits), self._marks]
+        wp.launch(walk_rays, len(self.sources), inputs=inputs, outputs=[_share(found), _share(count)], device="cpu")
         found = found[: count[0]]
         if self._glass_scene is not None:
             found = np.concatenate([found, self._look_through_glass(origins, directions, reach, run)])
@@ -186,20 +229,22 @@ class Caster:
         once = np.unique(rows * self.potential_objects.shape[1] + objects, return_index=True)[1]
         return np.column_stack([rows[once], np.ones(len(once)), objects[once], part[once]]).astype(np.int32)
 
-    def raw_rate(self, rounds: int = 3) -> float:
-        """Rays a second of Embree alone, on the same rays and two threads; the median of some rounds."""
-        run = max(1, 100_000 // len(self.sources))
-        batches = [self.rays(k * run, run) for k in range(2)]
-        rates = []
-        for _ in range(rounds):
-            start = time.perf_counter()
-            threads = [threading.Thread(target=self._scene.run, args=batch) for batch in batches]
-            for thread in threads:
-                thread.start()
-            for thread in threads:
-                thread.join()
-            rates.append(sum(len(o) for o, _ in batches) / (time.perf_counter() - start))
-        return float(np.median(rates))
+    def cell_rays(self, total: int) -> int:
+        """How many of the first `total` rays of every row are walked through the cells; a bare graph's all are."""
+        spots = np.array([len(own) for own in self.spots])
+        whole, rest = np.divmod(total, ROUNDS * spots)
+        return int((whole * self._walked * spots + np.minimum(rest, self._walked * spots)).sum())
+
+    def raw_rate(self, first: int, run: int) -> float:
+        """Rays a second of Embree alone, on two batches of the same rays and two threads."""
+        batches = [[array.copy() for array in self.rays(first + k * run, run)] for k in range(2)]
+        threads = [threading.Thread(target=self._scene.run, args=batch) for batch in batches]
+        start = time.perf_counter()
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        return sum(len(origins) for origins, _ in batches) / (time.perf_counter() - start)
 
 
 def embree_scene(triangles: np.ndarray) -> EmbreeScene | None:
@@ -214,6 +259,8 @@ def embree_scene(triangles: np.ndarray) -> EmbreeScene | None:
     return scene
 
 
-def _share(array: np.ndarray) -> wp.array:
-    """The array as Warp sees it, without a copy."""
-    return wp.array(array, device="cpu", copy=False)
+def _share(array: np.ndarray, dtype: type | None = None) -> wp.array:
+    """The array as Warp sees it, without a copy; `dtype` gathers the last axes into vectors or matrices."""
+    if dtype is None:
+        return wp.array(array, device="cpu", copy=False)
+    return wp.array(array, dtype=dtype, device="cpu", copy=False)

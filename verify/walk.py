@@ -18,6 +18,8 @@ EDGE_SLACK = wp.constant(wp.float64(1.0e-6))
 # A cell counts as entered only clearly before the hit, whose distance is float32.
 BEFORE_HIT = wp.constant(wp.float64(1.0 - 1.0e-6))
 STEPS = wp.constant(4096)
+# Rounds through a cell's origins after which the purposes of its rays repeat.
+ROUNDS = wp.constant(5)
 # Candidates kept of one (cell, target) pair: if the first ones only graze, a later one may not.
 ATTEMPTS = wp.constant(8)
 
@@ -30,7 +32,7 @@ class Links:
         starts: shape (6 cells + 1,), int32; the links of face 2 axis + (1 on the high side) of cell c are
             starts[6 c + face] to starts[6 c + face + 1].
         cells: cell behind each link, shape (links,), int32.
-        rectangles: low u, high u, low v, high v [grid steps], shape (links, 4), float64; u, v: the other axes.
+        rectangles: low u, high u, low v, high v [grid steps], shape (links, 4), int32; u, v: the other axes.
         portals: portal_id of each link, -1 for a bare contact, shape (links,), int32.
     """
 
@@ -78,11 +80,13 @@ def _table(
     count: int, low: np.ndarray, high: np.ndarray, axis: np.ndarray, rectangles: np.ndarray, portals: np.ndarray
 ) -> Links:
     keys = np.concatenate([6 * low + 2 * axis + 1, 6 * high + 2 * axis])
-    order = np.argsort(keys, kind="stable")
+    # The largest of a face's links first: most rays take it, and the walk looks at them one by one.
+    area = np.prod(rectangles[:, 1::2].astype(np.float64) - rectangles[:, ::2], axis=1)
+    order = np.lexsort([-np.tile(area, 2), keys])
     return Links(
         np.searchsorted(keys[order], np.arange(6 * count + 1)).astype(np.int32),
         np.concatenate([high, low])[order].astype(np.int32),
-        np.ascontiguousarray(np.concatenate([rectangles, rectangles])[order].astype(np.float64)),
+        np.ascontiguousarray(np.concatenate([rectangles, rectangles])[order].astype(np.int32)),
         np.concatenate([portals, portals])[order].astype(np.int32),
     )
 
@@ -91,11 +95,10 @@ def _table(
 class Maze:
     """Cells and links on the device; see `Links`."""
 
-    boxes: wp.array2d[wp.float64]
+    boxes: wp.array2d[int]
     starts: wp.array[int]
     cells: wp.array[int]
-    rectangles: wp.array2d[wp.float64]
-    portals: wp.array[int]
+    rectangles: wp.array2d[int]
 
 
 @wp.struct
@@ -110,16 +113,16 @@ class Sightings:
 
 @wp.func
 def _follow(maze: Maze, cell: int, face: int, u: wp.float64, v: wp.float64) -> int:
-    """Link of the face that surely holds the point (u, v), -1 if none does."""
+    """Cell behind the link of the face that surely holds the point (u, v), -1 if there is none."""
     slot = 6 * cell + face
     for link in range(maze.starts[slot], maze.starts[slot + 1]):
         if (
-            u > maze.rectangles[link, 0] + EDGE_SLACK
-            and u < maze.rectangles[link, 1] - EDGE_SLACK
-            and v > maze.rectangles[link, 2] + EDGE_SLACK
-            and v < maze.rectangles[link, 3] - EDGE_SLACK
+            u > wp.float64(maze.rectangles[link, 0]) + EDGE_SLACK
+            and u < wp.float64(maze.rectangles[link, 1]) - EDGE_SLACK
+            and v > wp.float64(maze.rectangles[link, 2]) + EDGE_SLACK
+            and v < wp.float64(maze.rectangles[link, 3]) - EDGE_SLACK
         ):
-            return link
+            return maze.cells[link]
     return -1
 
 
@@ -153,47 +156,56 @@ def _mark(
         candidates[slot, 3] = ray
 
 
-@wp.kernel
-def walk_rays(
-    maze: Maze, sources: wp.array[int], origins: wp.array2d[float], directions: wp.array2d[float],
-    reach: wp.array[float], owners: wp.array[int], hits: wp.array[int], sightings: Sightings,
+@wp.func
+def _walk(
+    maze: Maze, row: int, cell: int, ray: int, o: wp.vec3d, d: wp.vec3d, end: wp.float64, sightings: Sightings,
     candidates_out: wp.array2d[int], count_out: wp.array[int],
 ):  # fmt: skip
-    """Mark the cells that each ray enters before its hit, and the object it hits.
-
-    Rays come in equal runs, one a row: ray i belongs to row i // (rays / rows), whose cell is sources[row]. `reach` is
-    the hit's parameter, `hits` its triangle or -1, `owners` the object of each triangle.
-    """
-    ray = wp.tid()
-    row = ray // (origins.shape[0] // sources.shape[0])
-    cell = sources[row]
-    o = wp.vec3d(wp.float64(origins[ray, 0]), wp.float64(origins[ray, 1]), wp.float64(origins[ray, 2]))
-    d = wp.vec3d(wp.float64(directions[ray, 0]), wp.float64(directions[ray, 1]), wp.float64(directions[ray, 2]))
-    end = wp.float64(wp.inf)
-    if hits[ray] >= 0:
-        end = wp.float64(reach[ray]) * BEFORE_HIT
-        _mark(sightings.objects, sightings.potential_objects, row, owners[hits[ray]], ray, 1, candidates_out, count_out)
+    """Mark the cells that a ray from a cell enters before the parameter `end`."""
     # A component of 0 gives infinite times: that axis' faces are never reached.
     pace = wp.vec3d(wp.float64(1.0) / d[0], wp.float64(1.0) / d[1], wp.float64(1.0) / d[2])
     sx, sy, sz = _side(d[0]), _side(d[1]), _side(d[2])
     for _ in range(STEPS):
-        tx = (maze.boxes[cell, 3 * sx] - o[0]) * pace[0]
-        ty = (maze.boxes[cell, 3 * sy + 1] - o[1]) * pace[1]
-        tz = (maze.boxes[cell, 3 * sz + 2] - o[2]) * pace[2]
+        tx = (wp.float64(maze.boxes[cell, 3 * sx]) - o[0]) * pace[0]
+        ty = (wp.float64(maze.boxes[cell, 3 * sy + 1]) - o[1]) * pace[1]
+        tz = (wp.float64(maze.boxes[cell, 3 * sz + 2]) - o[2]) * pace[2]
         t = wp.min(tx, wp.min(ty, tz))
         if t >= end:
             return
-        link = -1
-        if t == tx:
-            link = _follow(maze, cell, sx, o[1] + t * d[1], o[2] + t * d[2])
-        elif t == ty:
-            link = _follow(maze, cell, 2 + sy, o[0] + t * d[0], o[2] + t * d[2])
-        else:
-            link = _follow(maze, cell, 4 + sz, o[0] + t * d[0], o[1] + t * d[1])
-        if link < 0:
+        # The face left by and the place on it, chosen without a branch: it could not be predicted.
+        face = wp.where(t == tx, sx, wp.where(t == ty, 2 + sy, 4 + sz))
+        u = wp.where(t == tx, o[1] + t * d[1], o[0] + t * d[0])
+        v = wp.where(face >= 4, o[1] + t * d[1], o[2] + t * d[2])
+        cell = _follow(maze, cell, face, u, v)
+        if cell < 0:
             return
-        cell = maze.cells[link]
         _mark(sightings.cells, sightings.potential_cells, row, cell, ray, 0, candidates_out, count_out)
+
+
+@wp.kernel
+def walk_rays(
+    maze: Maze, sources: wp.array[int], run: int, spot_counts: wp.array[int], first: int, walked: int,
+    origins: wp.array[wp.vec3], directions: wp.array[wp.vec3], reach: wp.array[float], owners: wp.array[int],
+    hits: wp.array[int], sightings: Sightings, candidates_out: wp.array2d[int], count_out: wp.array[int],
+):  # fmt: skip
+    """Mark the object that each ray hits and, in the `walked` first rounds of five, the cells it enters before its hit.
+
+    Rays come in equal runs, one a row: ray i belongs to row i // run, whose cell is sources[row]; the run's first is
+    number `first` of that row. `reach` is the hit's parameter, `hits` its triangle or -1, `owners` the object of each
+    triangle.
+    """
+    row = wp.tid()
+    cell = sources[row]
+    for ray in range(row * run, (row + 1) * run):
+        end = wp.float64(wp.inf)
+        if hits[ray] >= 0:
+            end = wp.float64(reach[ray]) * BEFORE_HIT
+            seen = owners[hits[ray]]
+            _mark(sightings.objects, sightings.potential_objects, row, seen, ray, 1, candidates_out, count_out)
+        if ((first + ray - row * run) // spot_counts[row]) % ROUNDS < walked:
+            o = wp.vec3d(origins[ray])
+            d = wp.vec3d(directions[ray])
+            _walk(maze, row, cell, ray, o, d, end, sightings, candidates_out, count_out)
 
 
 def portal_path(

@@ -29,6 +29,8 @@ AIMS = (1 << 14, 1 << 20)
 # The same in hidden cells beside the potentially visible ones, for each source.
 FRONTIER = (64, 4096)
 THREADS = 2
+# Embree's own rate is taken so many times in a run.
+RATE_BLOCKS = 5
 KINDS = ("cell", "object")
 
 
@@ -161,26 +163,44 @@ def _make_caster(
 def _cast_all(bake: "Bake", caster: Caster, judge: Judge, rays: int, progress: bool, result: VerifyResult) -> None:
     """Cast in batches on two threads; judge candidates in order; stop at the first wrong-hidden."""
     rows = len(caster.sources)
-    total, run = -(-rays // rows), max(1, BATCH_RAYS // rows)
+    total = -(-rays // rows)
     # The first batch is one ray a cell: it compiles the kernels, outside the clock and on one thread.
     start = time.perf_counter()
     if _judge_batch(bake, caster, judge, caster.cast(0, 1), result):
-        result.rays = rows
+        result.rays, result.cell_rays = rows, caster.cell_rays(1)
         return
     result.seconds["compile"] = time.perf_counter() - start
-    batches = [(first, min(run, total - first)) for first in range(1, total, run)]
-    start, cast = time.perf_counter(), rows
+    blocks, done, spent = _blocks(rows, total), 1, 0.0
     bar = tqdm(total=rows * total, initial=rows, unit="ray", unit_scale=True, disable=not progress)
     with ThreadPoolExecutor(THREADS) as pool, bar:
-        for (_, count), found in zip(batches, pool.map(lambda batch: caster.cast(*batch), batches), strict=True):
-            cast += rows * count
-            bar.update(rows * count)
-            if _judge_batch(bake, caster, judge, found, result):
-                pool.shutdown(cancel_futures=True)
+        for block in blocks:
+            start, first = time.perf_counter(), done
+            for (_, run), found in zip(block, pool.map(lambda batch: caster.cast(*batch), block), strict=True):
+                done += run
+                bar.update(rows * run)
+                if _judge_batch(bake, caster, judge, found, result):
+                    pool.shutdown(cancel_futures=True)
+                    break
+            seconds = time.perf_counter() - start
+            spent += seconds
+            if result.wrong_hidden:
                 break
-    result.rays, result.seconds["rays"] = cast, time.perf_counter() - start
-    result.rays_per_second = (cast - rows) / result.seconds["rays"]
-    result.embree_rate = caster.raw_rate() if judge.lines is not None and len(judge.lines.triangles) else 0.0
+            if judge.lines is not None and len(judge.lines.triangles):
+                # Embree alone beside each block: when the machine is busy with something else, both suffer.
+                rate = caster.raw_rate(first, block[0][1])
+                result.embree_rates.append((rows * (done - first) / seconds, rate))
+    result.rays, result.cell_rays, result.seconds["rays"] = rows * done, caster.cell_rays(done), spent
+    result.rays_per_second = rows * (done - 1) / spent if spent else 0.0
+
+
+def _blocks(rows: int, total: int) -> list[list[tuple[int, int]]]:
+    """Batches (first ray, rays a row) of rays 1 to total - 1 in at most five blocks that keep all threads busy."""
+    pieces = THREADS * RATE_BLOCKS
+    pieces *= -(-(total - 1) * rows // (pieces * BATCH_RAYS))
+    run = max(1, -(-(total - 1) // max(pieces, 1)))
+    batches = [(first, min(run, total - first)) for first in range(1, total, run)]
+    size = max(1, pieces // RATE_BLOCKS)
+    return [batches[place : place + size] for place in range(0, len(batches), size)]
 
 
 def _judge_batch(bake: "Bake", caster: Caster, judge: Judge, found: Candidates, result: VerifyResult) -> bool:
