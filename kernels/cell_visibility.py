@@ -97,12 +97,13 @@ def search_rounds(model: Model, boxes: np.ndarray, rows: np.ndarray) -> TargetAn
     return answers
 
 
-def cell_rows(model: Model, sources: np.ndarray) -> CellRows:
+def cell_rows(model: Model, sources: np.ndarray, aim_rounds: tuple[int, ...] = AIM_ROUNDS) -> CellRows:
     """Every cell that is not proved hidden from the sources, itself included.
 
     Args:
         model: the model.
         sources: cells, shape (n,), int.
+        aim_rounds: sightlines shot at each pair that still lacks a witness, round by round.
 
     Returns:
         Reached pairs. A pair that is left out is hidden, exactly; `seen` pairs have a witness that clears every opaque
@@ -121,7 +122,7 @@ def cell_rows(model: Model, sources: np.ndarray) -> CellRows:
     seen = lined.copy()
     seen[lined] = accept(model, source[lined], target[lined], origin[lined], end[lined])
     if model.triangles is not None:
-        _aim(model, source, target, origin, end, seen)
+        _aim(model, source, target, origin, end, seen, aim_rounds)
     return _finish(model, sources, source, target, seen, origin, end)
 
 
@@ -220,12 +221,18 @@ def outside(model: Model, source: np.ndarray, origin: np.ndarray, wanted: np.nda
 
 
 def _aim(
-    model: Model, source: np.ndarray, target: np.ndarray, origin: np.ndarray, end: np.ndarray, seen: np.ndarray
+    model: Model,
+    source: np.ndarray,
+    target: np.ndarray,
+    origin: np.ndarray,
+    end: np.ndarray,
+    seen: np.ndarray,
+    aim_rounds: tuple[int, ...],
 ) -> None:
     """Shoot at pairs that have no witness yet; fills origin, end and seen in place."""
     cells = model.graph.cells
     refused = np.zeros(len(source), bool)
-    for number, tries in enumerate(AIM_ROUNDS):
+    for number, tries in enumerate(aim_rounds):
         rows = np.flatnonzero(~seen)
         # A line on a seam between portals is clear and still no witness, and so is everything near it.
         again = rows[refused[rows]]

@@ -37,7 +37,9 @@ class ObjectModel:
     ranges: np.ndarray
 
 
-def object_rows(model: Model, objects: ObjectModel, reached: CellRows) -> ObjectRows:
+def object_rows(
+    model: Model, objects: ObjectModel, reached: CellRows, aim_rounds: tuple[int, ...] = AIM_ROUNDS
+) -> ObjectRows:
     """Every object that is not proved hidden from the sources of `reached`.
 
     Returns:
@@ -65,7 +67,7 @@ def object_rows(model: Model, objects: ObjectModel, reached: CellRows) -> Object
         0,
     )
     potential, hints, kept_parts, hint_pair = _prove(model, objects, rows, parts, part_source, pair_of)
-    for number, tries in enumerate(AIM_ROUNDS):
+    for number, tries in enumerate(aim_rounds):
         todo = np.flatnonzero(~rows.seen[hint_pair])
         at = kept_parts[todo]
         _aim(model, objects, rows, hint_pair[todo], incidence.boxes[at], hints[todo], at, tries, number + 1)

@@ -7,6 +7,7 @@ import shutil
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from tqdm import tqdm
@@ -19,10 +20,13 @@ from ..data.graph_folder import read_graph
 from ..data.inhabit import find_inhabitable
 from ..data.opaque import OpaquePlanes, opaque_planes
 from ..data.portals import find_portals
-from ..data.scene import GRID_M, Role, Scene
+from ..data.scene import GRID_LIMIT, GRID_M, Role, Scene
 from ..data.scene_folder import replaceable, scene_manifest
 from ..data.solids import closed_elements, dead_cells
 from ..data.subdivide import cut_rooms, merge, subdivide
+
+if TYPE_CHECKING:
+    from ..kernels.engine import Engine
 
 MARGIN_M = 2.0
 # Sources a block: a block is what an interrupted bake resumes from.
@@ -203,8 +207,9 @@ def build_graph(scene: Scene, settings: Settings, clock: Clock) -> tuple[CellGra
     occluders = scene.object_mask(Role.OCCLUDER)
     opaque = opaque_planes(triangles[occluders[owners]])
     margin = round(MARGIN_M / scene.grid_m)
-    low = triangles.min(axis=(0, 1)).astype(np.int64) - margin
-    high = triangles.max(axis=(0, 1)).astype(np.int64) + margin
+    # The grid's own limit is where the kernels stop being exact.
+    low = np.maximum(triangles.min(axis=(0, 1)).astype(np.int64) - margin, -GRID_LIMIT)
+    high = np.minimum(triangles.max(axis=(0, 1)).astype(np.int64) + margin, GRID_LIMIT)
     leaves = subdivide(opaque, low, high, settings.threshold_m2 / scene.grid_m**2)
     rooms = [[s.vertices.min(axis=0), s.vertices.max(axis=0)] for s in scene.spaces]
     boxes = np.round(np.array(rooms).reshape(-1, 2, 3) / scene.grid_m).astype(np.int64)
@@ -256,22 +261,44 @@ def _visibility(
     sources = np.flatnonzero(graph.inhabitable)
     blocks = [sources[i : i + BLOCK] for i in range(0, len(sources), BLOCK)] if scene is not None else [sources]
     store = _Store(_partial(out), print_)
-    deadline = None if budget_s is None else time.perf_counter() + budget_s
-    parts, spent = [], False
     bar = tqdm(total=len(sources), unit="cell", desc="visibility", disable=not progress)
-    for number, block in enumerate(blocks):
-        part = store.load(number)
-        if part is None:
-            late = deadline is not None and time.perf_counter() > deadline
-            spent |= late
-            part = engine.unknown(block) if late else engine.visible(block)
-            if not late:
-                store.save(number, part)
-        parts.append(part)
-        bar.update(len(block))
+    if budget_s is None:
+        parts, spent = [_finish_block(engine, store, number, block, bar) for number, block in enumerate(blocks)], False
+    else:
+        parts, spent = _within(engine, store, blocks, time.perf_counter() + budget_s, bar)
     bar.close()
     clock.lap("flood")
     return *engine.join(parts), spent
+
+
+def _finish_block(engine: "Engine", store: "_Store", number: int, block: np.ndarray, bar: tqdm) -> object:
+    """A block as far as it goes, from the store if it is there."""
+    part = store.load(number)
+    if part is None:
+        part = engine.visible(block)
+        store.save(number, part)
+    bar.update(len(block))
+    return part
+
+
+def _within(
+    engine: "Engine", store: "_Store", blocks: list[np.ndarray], deadline: float, bar: tqdm
+) -> tuple[list[object], bool]:
+    """All blocks before a deadline: first what is hidden from each, then witnesses where most is unknown."""
+    parts, rough = [], []
+    for number, block in enumerate(blocks):
+        part = store.load(number)
+        if part is None:
+            rough.append(number)
+            part = engine.visible(block, aim=False) if time.perf_counter() < deadline else engine.unknown(block)
+        else:
+            bar.update(len(block))
+        parts.append(part)
+    rough.sort(key=lambda number: -parts[number].unknown_count)
+    while rough and time.perf_counter() < deadline:
+        number = rough.pop(0)
+        parts[number] = _finish_block(engine, store, number, blocks[number], bar)
+    return parts, bool(rough)
 
 
 class _Store:
