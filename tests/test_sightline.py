@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.errors import InputError
 from viewcell.data.readers import read
+from viewcell.verify.boxtree import BoxTree
 from viewcell.verify.rays import embree_scene
 from viewcell.verify.sightline import Sight, Sightlines, closed_objects
 
@@ -192,3 +193,19 @@ def test_agrees_with_embree_on_a_real_building():
 def test_bad_input_is_one_line(origins, ends):
     with pytest.raises(InputError, match=r"expected .* found [^\n]*$"):
         Sightlines(UNIT[None]).check(origins, ends)
+
+
+def test_large_trees_hold_every_box():
+    """Above 65,536 boxes neighbours are grouped; what a segment meets must not change."""
+    rng = np.random.default_rng(8)
+    low = rng.integers(-(2**20), 2**20, (70_000, 3))
+    high = low + rng.integers(0, 20_000, low.shape)
+    origins, ends = rng.uniform(-(2**20), 2**20, (2, 40, 3))
+    segments, boxes = BoxTree(low, high).candidates(origins, ends)
+    found = set(zip(segments.tolist(), boxes.tolist(), strict=True))
+    for number, (origin, end) in enumerate(zip(origins, ends, strict=True)):
+        first, last = (low - origin) / (end - origin), (high - origin) / (end - origin)
+        enter, leave = np.minimum(first, last).max(axis=1), np.maximum(first, last).min(axis=1)
+        met = np.flatnonzero((enter <= leave) & (leave >= 0) & (enter <= 1))
+        assert {(number, int(box)) for box in met} <= found
+    assert len(found) < 40 * 70_000 / 10

@@ -127,9 +127,17 @@ class Sightlines:
         return closed_objects(self.triangles, self.owners)
 
     @cached_property
-    def _solids(self) -> "Sightlines":
-        part = np.isin(self.owners, self.closed_owners)
-        return Sightlines(self.triangles[part], self.owners[part])
+    def _solids(self) -> tuple[np.ndarray, np.ndarray, BoxTree]:
+        """Boxes of the closed objects, shape (2, objects, 3), each object's place among them (-1: open), their tree."""
+        closed = self.closed_owners
+        place = np.full(int(self.owners.max(initial=0)) + 1, -1)
+        place[closed] = np.arange(len(closed))
+        part = place[self.owners]
+        bounds = np.empty((2, len(closed), 3), np.int64)
+        bounds[0], bounds[1] = 2**30, -(2**30)
+        np.minimum.at(bounds[0], part[part >= 0], self.triangles[part >= 0].min(axis=1))
+        np.maximum.at(bounds[1], part[part >= 0], self.triangles[part >= 0].max(axis=1))
+        return bounds, place, BoxTree(*bounds)
 
     def outside_solids(self, points: np.ndarray) -> np.ndarray:
         """Whether each point lies strictly outside every closed object, each object taken alone.
@@ -146,16 +154,30 @@ class Sightlines:
         """
         points = _points(points, "points")
         outside = np.ones(len(points), bool)
-        if len(self._solids.triangles):
-            inside = _batched(lambda part: (self._solids._inside(points[part]),), len(points))[0]
+        if len(self.closed_owners):
+            inside = _batched(lambda part: (self._inside(points[part]),), len(points))[0]
             outside[inside] = False
         return outside
 
     def _inside(self, points: np.ndarray) -> np.ndarray:
-        """Points on or inside an object: count the signed crossings of the column above each, object by object."""
-        top = points.copy()
-        top[:, 2] = np.maximum(points[:, 2], float(self.triangles[:, :, 2].max()) + 1)
-        which, ids = self._tree.candidates(points, top)
+        """Points on or inside a closed object: count the signed crossings of the column above each, by object.
+
+        Only objects whose box holds the point are looked at, and columns end above their boxes.
+        """
+        bounds, place, tree = self._solids
+        held, by = tree.candidates(points, points)
+        count = len(self.closed_owners)
+        pairs = np.sort(held * count + by)
+        tops = np.full(len(points), -np.inf)
+        np.maximum.at(tops, held, bounds[1, by, 2] + 1.0)
+        chosen = np.flatnonzero(tops > -np.inf)
+        top = points[chosen].copy()
+        top[:, 2] = np.maximum(top[:, 2], tops[chosen])
+        which, ids = self._tree.candidates(points[chosen], top)
+        which, object_place = chosen[which], place[self.owners[ids]]
+        keys = which * count + object_place
+        known = (object_place >= 0) & (pairs[np.minimum(np.searchsorted(pairs, keys), max(len(pairs) - 1, 0))] == keys)
+        which, ids, keys = which[known], ids[known], keys[known]
         with np.errstate(over="ignore", invalid="ignore", under="ignore"):
             side = self._plane_side(ids, points[which])
             turns = self._column_turns(ids, points[which])
@@ -170,9 +192,9 @@ class Sightlines:
             if on:
                 touched.append(which[pair : pair + 1])
         hit = crossing != 0
-        keys, slot = np.unique(which[hit] * (int(self.owners.max()) + 1) + self.owners[ids[hit]], return_inverse=True)
+        keys, slot = np.unique(keys[hit], return_inverse=True)
         winding = np.bincount(slot, weights=crossing[hit], minlength=len(keys))
-        return np.concatenate([*touched, keys[winding != 0] // (int(self.owners.max()) + 1)])
+        return np.concatenate([*touched, keys[winding != 0] // count])
 
     def _column_turns(self, ids: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Signs of the points against the triangles' edges in plan, shape (pairs, 3); 0 where float64 cannot tell."""
@@ -192,15 +214,20 @@ def closed_objects(triangles: np.ndarray, owners: np.ndarray) -> np.ndarray:
         triangles: corners [grid steps], shape (m, 3, 3), integers below 2**25 in size.
         owners: object_id of each triangle, shape (m,).
     """
+    if not len(triangles):
+        return np.zeros(0, owners.dtype)
     corners = triangles.reshape(-1, 3).astype(np.int64) + 2**25
     plan = np.unique(corners[:, 0] * 2**26 + corners[:, 1], return_inverse=True)[1]
-    ids = np.unique(plan * 2**26 + corners[:, 2], return_inverse=True)[1].reshape(-1, 3)
-    start, end = ids.ravel(), np.roll(ids, -1, axis=1).ravel()
-    pair = np.unique(np.minimum(start, end) * (ids.max(initial=0) + 1) + np.maximum(start, end), return_inverse=True)[1]
-    owner = np.repeat(owners.astype(np.int64), 3)
-    keys, slot = np.unique(owner * (pair.max(initial=0) + 1) + pair, return_inverse=True)
-    balance = np.bincount(slot, weights=np.sign(end - start), minlength=len(keys))
-    unmatched = keys[balance != 0] // (pair.max(initial=0) + 1)
+    # A corner's number tells its object too, and the edges between two corners are those of one object.
+    space = np.unique(plan * 2**26 + corners[:, 2], return_inverse=True)[1]
+    known, ids = np.unique(np.repeat(owners.astype(np.int64), 3) * len(corners) + space, return_inverse=True)
+    start, end = ids, np.roll(ids.reshape(-1, 3), -1, axis=1).ravel()
+    keys = np.minimum(start, end) * len(corners) + np.maximum(start, end)
+    order = np.argsort(keys)
+    keys = keys[order]
+    first = np.flatnonzero(np.diff(keys, prepend=-1))
+    balance = np.add.reduceat(np.sign(end - start)[order], first)
+    unmatched = known[keys[first[balance != 0]] // len(corners)] // len(corners)
     return np.setdiff1d(owners, unmatched)
 
 
