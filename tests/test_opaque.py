@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.graph import OTHER_AXES
 from viewcell.data.opaque import decompose, opaque_planes, plane_rectangles
-
-LAW = settings(max_examples=100, deadline=None, derandomize=True)
 
 
 def covered(triangles, points):
@@ -51,7 +49,6 @@ def axial_triangles(rng, count, size=20):
     return np.array(out, np.int32)
 
 
-@LAW
 @given(st.integers(0, 2**32), st.integers(1, 7))
 def test_axial_outlines_are_kept_exactly(seed, count):
     triangles = axial_triangles(np.random.default_rng(seed), count)
@@ -64,7 +61,6 @@ def test_axial_outlines_are_kept_exactly(seed, count):
     assert area == np.prod((rectangles[:, 1] - rectangles[:, 0]).astype(np.int64), axis=1).sum()
 
 
-@LAW
 @given(st.integers(0, 2**32), st.integers(1, 5), st.sampled_from([20, 3000]))
 def test_oblique_outlines_are_never_exceeded(seed, count, size):
     """Every output rectangle lies in the union of the triangles: at its corners and on a raster inside it."""
