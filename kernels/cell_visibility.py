@@ -71,8 +71,10 @@ def segments(
     sign = np.where((answers.octant[rows][:, None] >> np.arange(3)) & 1, -1.0, 1.0)
 
     def times(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        ends = np.sort(boxes.astype(float) * sign[:, None], axis=1)
-        return (w * ends[:, 0] - xi).max(axis=1), (w * ends[:, 1] - xi).min(axis=1)
+        ends = boxes.astype(float) * sign[:, None]
+        ends = np.stack([ends.min(axis=1), ends.max(axis=1)], axis=1)
+        low, high = w * ends[:, 0] - xi, w * ends[:, 1] - xi
+        return np.maximum.reduce(low.T), np.minimum.reduce(high.T)
 
     def place(time: np.ndarray) -> np.ndarray:
         return np.round(sign * (time[:, None] + xi) / w * 1024.0) / 1024.0
@@ -145,8 +147,10 @@ def _jitter(
     """Move lines that run along a seam between portals, less and less; fills origin, end and seen in place."""
     cells = model.graph.cells.astype(float)
     random = np.random.default_rng(model.seed)
+    rows = np.flatnonzero(~seen)
+    rows = rows[(origin[rows] != end[rows]).any(axis=1)]
     for power in np.repeat(np.arange(2, 14, 2), 8):
-        rows = np.flatnonzero(~seen & (origin != end).any(axis=1))
+        rows = rows[~seen[rows]]
         if not len(rows):
             return
         moved = []
@@ -195,8 +199,7 @@ def join_rows(model: Model, parts: list[CellRows]) -> VisibleRows:
 def accept(model: Model, source: np.ndarray, target: np.ndarray, origin: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Segments that are witnesses: inside their cells, clear, from outside every solid, through portals all the way."""
     cells = model.graph.cells
-    ok = ((origin > cells[source, 0]) & (origin < cells[source, 1])).all(axis=1)
-    ok &= ((end > cells[target, 0]) & (end < cells[target, 1])).all(axis=1)
+    ok = strictly_inside(origin, cells[source]) & strictly_inside(end, cells[target])
     if model.triangles is not None:
         rows = np.flatnonzero(ok)
         none = np.full(len(rows), -1)
@@ -205,10 +208,23 @@ def accept(model: Model, source: np.ndarray, target: np.ndarray, origin: np.ndar
         ok &= outside(model, source, origin, ok)
     rows = np.flatnonzero(ok)
     reached, _, _ = launch_walk(
-        model.device_graph, source[rows], origin[rows], end[rows], threads=model.threads, device=model.device
+        model.device_graph,
+        source[rows],
+        origin[rows],
+        end[rows],
+        record=False,
+        threads=model.threads,
+        device=model.device,
     )
     ok[rows] = reached == target[rows]
     return ok
+
+
+def strictly_inside(points: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    """Whether each point lies in the open box of its row, shape (n,), bool."""
+    inside = (points > boxes[:, 0]) & (points < boxes[:, 1])
+    # Three columns: NumPy's reduction along so short an axis is many times slower.
+    return inside[:, 0] & inside[:, 1] & inside[:, 2]
 
 
 def outside(model: Model, source: np.ndarray, origin: np.ndarray, wanted: np.ndarray) -> np.ndarray:

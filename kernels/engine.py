@@ -148,7 +148,7 @@ class Engine:
             state[row_of[cell[both]], sources[row[both]]] = 1
             if len(octants) == 4:
                 # Half the octants prove a pair hidden only together with the other end's half.
-                state[(state == 2) & (state[row_of[np.arange(count)]][:, sources].T == 0)] = 0
+                state[(state == 2) & (state.T == 0)] = 0
         todo = np.argwhere(state == 0)
         once = (row_of[todo[:, 1]] < 0) | (sources[todo[:, 0]] < todo[:, 1])
         todo = todo[once]
