@@ -8,8 +8,8 @@ import pytest
 from matplotlib.image import imread
 from viewcell.data.errors import InputError
 from viewcell.data.graph import CellGraph
-from viewcell.verify.plans import COLOURS, Painter, Section, find_storeys, plan_of, section_lines
-from viewcell.workbench.report import choose_cells, report
+from viewcell.verify.plans import COLOURS, Painter, Section, _label, find_storeys, plan_of, section_lines
+from viewcell.workbench.report import SIGHTLINES_MOST, choose_cells, model_name, report
 
 HOUSE = runpy.run_path(str(Path(__file__).with_name("small_house.py")))
 GRID = 2.0**-10
@@ -130,3 +130,40 @@ def test_painter_cuts_what_the_section_meets(house):
     section = Section(2, 21 * 64 + 0.5)
     assert section.cuts(house.graph.cells).tolist() == [True, False, True, False, True, True, False]
     assert painter.graph is house.graph and section.across == (0, 1) and Section(1, 0.5).across == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("source", "name"),
+    [
+        ("make_office(floors=3, rooms_per_side=8, seed=0, furnished=True)", "Synthetic office, 3 floors"),
+        ("make_office(like='soda-hall', seed=0)", "Synthetic office like soda-hall"),
+        ("some/folder/house.ifc", "house.ifc"),
+        ("", "house"),
+    ],
+)
+def test_models_have_short_names(house, source, name):
+    house.manifest["source"] = source
+    assert model_name(house) == name
+
+
+def test_labels_fit_their_cells():
+    assert _label(128, "2.105 open", np.array([9.0, 3.0])) == "128\n2.105 open"
+    assert _label(128, "2.105 open", np.array([5.0, 3.0])) == _label(128, "2.105 open", np.array([9.0, 2.0])) == "128"
+    assert _label(128, "2.105 open", np.array([1.5, 9.0])) == _label(128, "", np.array([9.0, 1.0])) == ""
+
+
+def test_the_caption_and_the_table_agree(house, tmp_path):
+    """Cell 0 sees itself and all it ought to; a cell that loses its witness is unknown, by name."""
+    text = report(house, cells=[0], out=tmp_path).read_text()
+    known = int(house.potential_cells[0].sum())
+    assert f"{known} cells seen, itself included, 0 unknown" in text and f"| {known} | {known} | 1.000 | 0 |" in text
+    assert f"The {min(known - 1, SIGHTLINES_MOST['cell'])} lines" in text
+    assert "\n| cell 4 |" not in text
+    rows = house.cell_to_cell.to_pylist()
+    for row in rows:
+        if row["cell_id"] == 0 and row["reached_cell_id"] == 4:
+            row.update(verdict="unknown", origin_x=None)
+    house.cell_to_cell = type(house.cell_to_cell).from_pylist(rows, schema=house.cell_to_cell.schema)
+    text = report(house, cells=[0], out=tmp_path).read_text()
+    kind = "inhabitable" if house.graph.inhabitable[4] else "wall, sliver or exterior"
+    assert f"{known - 1} cells seen, itself included, 1 unknown" in text and f"| cell 4 | {kind} cell |" in text

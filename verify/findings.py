@@ -124,13 +124,13 @@ class VerifyResult:
 
 
 def count_pairs(bake: "Bake", caster: Caster | None = None) -> list[Counts]:
-    """Pairs by class of targets: inhabitable cells, all cells, objects; with what a caster's rays saw, if given."""
+    """Pairs by class of targets: inhabitable cells, other cells, objects; with what a caster's rays saw, if given."""
     inhabitable = bake.graph.inhabitable
     tables = [
-        ("cells, inhabitable", bake.potential_cells[:, inhabitable], bake.cell_to_cell, "reached_cell_id", inhabitable),
-        ("cells, all", bake.potential_cells, bake.cell_to_cell, "reached_cell_id", None),
-        ("objects", bake.potential_objects, bake.cell_to_object, "object_id", None),
+        (name, bake.potential_cells[:, chosen], bake.cell_to_cell, "reached_cell_id", chosen)
+        for name, chosen in (("cells, inhabitable", inhabitable), ("cells, wall, sliver and exterior", ~inhabitable))
     ]
+    tables.append(("objects", bake.potential_objects, bake.cell_to_object, "object_id", None))
     counts = []
     for name, potential, table, target, chosen in tables:
         ids = visible_rows(table)[target].to_numpy()

@@ -9,6 +9,7 @@ from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
+from matplotlib.patheffects import withStroke
 
 from ..data.graph import OTHER_AXES, CellGraph
 from ..data.scene import Role, Scene
@@ -33,6 +34,10 @@ STEP_M = 0.5
 # Shown around the inhabitable cells.
 MARGIN_M = 2.0
 LABELS_MOST = 60
+LABEL_POINTS = 6.5
+# A letter is about so much wider than high, and lines are so far apart, in the font's size.
+LETTER_WIDTH, LINE_HEIGHT = 0.62, 1.3
+POINTS_AN_INCH = 72
 
 
 @dataclass(frozen=True)
@@ -240,11 +245,25 @@ class Painter:
         cells = storey.cells[section.cuts(self.graph.cells[storey.cells])]
         size = np.diff(self.graph.cells[cells], axis=1)[:, 0].astype(np.float64)
         largest = cells[np.argsort(-size[:, 0] * size[:, 1], kind="stable")[:LABELS_MOST]]
+        # The figure has half an inch of margin on either side of its panels.
+        figure = axes.get_figure()
+        scale = POINTS_AN_INCH * (figure.get_figwidth() - 1.0) / np.ptp(axes.get_xlim())
+        halo = [withStroke(linewidth=2.5, foreground="white")]
         for cell in largest:
-            place = self.graph.cells[cell].mean(axis=0)[:2] * self.grid_m
-            name = str(self.graph.cell_names[cell])
-            text = f"{cell}\n{name}" if name else str(cell)
-            axes.text(*place, text, ha="center", va="center", fontsize=6, color="#495057", zorder=6, clip_on=True)
+            box = self.graph.cells[cell] * self.grid_m
+            room = (box[1] - box[0])[:2] * scale / LABEL_POINTS
+            text = _label(int(cell), str(self.graph.cell_names[cell]), room)
+            style = {"ha": "center", "va": "center", "fontsize": LABEL_POINTS, "color": "#212529", "clip_on": True}
+            behind = {"facecolor": COLOURS["inhabitable"], "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
+            axes.text(*box.mean(axis=0)[:2], text, zorder=6, path_effects=halo, bbox=behind if text else None, **style)
+
+
+def _label(cell: int, name: str, room: np.ndarray) -> str:
+    """The id and name if there is room for them (in font sizes, x and y), else the id, else nothing."""
+    for lines in ([str(cell), name] if name else [str(cell)], [str(cell)]):
+        if max(map(len, lines)) * LETTER_WIDTH <= room[0] and len(lines) * LINE_HEIGHT <= room[1]:
+            return "\n".join(lines)
+    return ""
 
 
 def _finish(figure: Figure, handles: list, path: Path) -> None:

@@ -1,5 +1,6 @@
 """Look at a bake: plans of its storeys, the sets of chosen cells, and the numbers, as Markdown and PNG."""
 
+import re
 import shutil
 import tempfile
 from pathlib import Path
@@ -18,7 +19,14 @@ if TYPE_CHECKING:
 
     from ..data.database import Bake
 
-SIGHTLINES_MOST = 200
+# Sightlines drawn, to the largest cells and objects that are seen.
+SIGHTLINES_MOST = {"cell": 40, "object": 20}
+UNKNOWN_LISTED = 20
+STOREY_CAPTION = (
+    "What can be walked into is cream; red strokes are the openings (portals) through which cells see each other, "
+    "at the height of the cut, 1.2 m above the floor."
+)
+CALL = re.compile(r"make_(\w+)\((.*)\)")
 COUNTED = ("cells", "inhabitable cells", "portals", "objects", "opaque triangles")
 
 
@@ -81,42 +89,107 @@ def _seen_counts(bake: "Bake") -> np.ndarray:
 
 def _write(bake: "Bake", chosen: dict[int, str], folder: Path) -> None:
     painter, storeys = Painter(bake.graph, bake.scene, bake.grid_m), find_storeys(bake.graph, bake.grid_m)
-    name = Path(str(bake.manifest.get("source", ""))).name or Path(bake.folder).name
+    name = model_name(bake)
     lines = [f"# {name}", "", *_numbers(bake), "", "## Storeys", ""]
     for number, storey in enumerate(storeys):
         title = f"Storey {number}: floor at {storey.floor * bake.grid_m:.2f} m, {len(storey.cells)} inhabitable cells"
         painter.storey(storey, f"{name}, {title[0].lower()}{title[1:]}", folder / f"storey-{number}.png")
-        lines += [f"### {title}", "", f"![{title}](storey-{number}.png)", ""]
+        lines += [f"### {title}", "", f"![{title}](storey-{number}.png)", "", STOREY_CAPTION, ""]
     lines += ["## Potentially visible sets", "", *_set_table(bake, chosen), ""]
     for cell, why in chosen.items():
-        title = _draw_set(bake, painter, storeys, cell, folder / f"cell-{cell}.png")
-        lines += [f"### Cell {cell}: {why}", "", f"![{title}](cell-{cell}.png)", ""]
+        title, caption = _draw_set(bake, painter, storeys, cell, folder / f"cell-{cell}.png")
+        lines += [f"### Cell {cell}: {why}", "", f"![{title}](cell-{cell}.png)", "", caption, ""]
+        lines += _unknown_targets(bake, cell)
     (folder / "report.md").write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
 
 
-def _draw_set(bake: "Bake", painter: Painter, storeys: list[Storey], cell: int, path: Path) -> str:
-    """Draw one cell's set; returns the picture's title."""
-    rows = visible_rows(bake.cell_to_cell)
-    rows = rows.filter(rows["cell_id"].to_numpy() == cell)
-    sights = read_witnesses(rows, "reached_cell_id", bake.grid_m)
+def model_name(bake: "Bake") -> str:
+    """The model's file name, or what a synthetic model is in a few words."""
+    source = str(bake.manifest.get("source", ""))
+    call = CALL.fullmatch(source)
+    if call is None:
+        return Path(source).name or Path(bake.folder).name
+    like, floors = re.search(r"like='([^']+)'", call[2]), re.search(r"floors=(\d+)", call[2])
+    size = f" like {like[1]}" if like else f", {floors[1]} floors" if floors else ""
+    return f"Synthetic {call[1]}{size}"
+
+
+def _draw_set(bake: "Bake", painter: Painter, storeys: list[Storey], cell: int, path: Path) -> tuple[str, str]:
+    """Draw one cell's set; returns the picture's title and caption."""
+    seen_cells, cell_lines = _sights(bake, cell, "cell")
+    _, object_lines = _sights(bake, cell, "object")
     kinds = np.where(bake.potential_cells[cell], "unknown", "hidden")
-    kinds[sights.targets] = "seen"
+    kinds[seen_cells] = "seen"
     kinds[cell] = "source"
-    seen, unknown = int((kinds == "seen").sum()), int((kinds == "unknown").sum())
-    lines = np.stack([sights.origins, sights.ends], axis=1)
-    lines = lines[np.isfinite(lines).all(axis=(1, 2)) & (sights.targets != cell)]
-    # Evenly thinned: every part of the set keeps some sightlines, and the picture stays readable.
-    shown = lines[np.unique(np.linspace(0, len(lines) - 1, min(len(lines), SIGHTLINES_MOST)).astype(int))]
+    unknown, drawn = int((kinds == "unknown").sum()), np.concatenate([cell_lines, object_lines])
+    potential = int(bake.potential_cells[cell].sum())
     storey = next(s for s in storeys if cell in s.cells)
     low, high = bake.graph.cells[cell, :, 2]
     section = plan_of(storey, bake.grid_m)
     if not low < section.level < high:
         section = Section(2, (int(low) + int(high)) // 2 + 0.5)
     name = str(bake.graph.cell_names[cell])
-    title = f"Cell {cell}{f' ({name})' if name else ''} sees {seen} cells, {unknown} unknown"
-    thinned = f"; {len(shown)} of {len(lines)} sightlines drawn" if len(shown) < len(lines) else ""
-    painter.visible_set(cell, kinds, shown, section, title + thinned, path)
-    return title
+    named = f"Cell {cell}{f' ({name})' if name else ''}"
+    title = f"{named}: {potential - unknown:,} cells seen, itself included, {unknown:,} unknown"
+    painter.visible_set(cell, kinds, drawn, section, title, path)
+    caption = (
+        f"From the red cell one can see into every blue cell, and perhaps into the yellow ones ({unknown:,} in all); "
+        f"white cells are proved hidden. The {len(drawn)} lines are sightlines to the largest cells and objects seen; "
+        f"they are drawn whole, also where they run above or below the cut."
+    )
+    return title, caption
+
+
+def _sights(bake: "Bake", cell: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Targets that have a witness, and the witnesses of the largest, shape (n, 2, 3), in grid steps."""
+    table, column = (bake.cell_to_cell, "reached_cell_id") if kind == "cell" else (bake.cell_to_object, "object_id")
+    rows = visible_rows(table)
+    sights = read_witnesses(rows.filter(rows["cell_id"].to_numpy() == cell), column, bake.grid_m)
+    lines = np.stack([sights.origins, sights.ends], axis=1)
+    good = np.flatnonzero(np.isfinite(lines).all(axis=(1, 2)) & ((sights.targets != cell) | (kind == "object")))
+    size = _sizes(bake, kind)[sights.targets[good]]
+    return sights.targets, lines[good[np.argsort(-size, kind="stable")[: SIGHTLINES_MOST[kind]]]]
+
+
+def _sizes(bake: "Bake", kind: str) -> np.ndarray:
+    """Length of the diagonals of all cells' or objects' boxes [grid steps], float64; below 0 for empty objects."""
+    boxes = bake.graph.cells if kind == "cell" else bake.scene.object_bounds() if bake.scene else np.zeros((0, 2, 3))
+    extent = (boxes[:, 1].astype(np.float64) - boxes[:, 0]).min(axis=1, initial=np.inf)
+    return np.where(extent < 0, -1.0, np.linalg.norm(boxes[:, 1].astype(np.float64) - boxes[:, 0], axis=1))
+
+
+def _unknown_targets(bake: "Bake", cell: int) -> list[str]:
+    """Table of the largest targets that have neither witness nor proof."""
+    rows = []
+    for kind, potential in (("cell", bake.potential_cells[cell]), ("object", bake.potential_objects[cell])):
+        unknown = potential.copy()
+        unknown[_sights(bake, cell, kind)[0]] = False
+        unknown[cell if kind == "cell" else []] = False
+        ids, sizes = np.flatnonzero(unknown), _sizes(bake, kind)
+        last = ~bake.graph.inhabitable[ids] if kind == "cell" else np.zeros(len(ids), bool)
+        for target in ids[np.lexsort([-sizes[ids], last])[:UNKNOWN_LISTED]]:
+            rows.append(f"| {_describe(bake, kind, int(target))} | {sizes[target] * bake.grid_m:.2f} |")
+        if len(ids) > UNKNOWN_LISTED:
+            rows.append(f"| and {len(ids) - UNKNOWN_LISTED:,} smaller {kind}s | | | |")
+    if not rows:
+        return []
+    head = [
+        "Unknown from here, inhabitable cells and the largest first:",
+        "",
+        "| target | kind | name | diagonal [m] |",
+        "|---|---|---|---|",
+    ]
+    return [*head, *rows, ""]
+
+
+def _describe(bake: "Bake", kind: str, target: int) -> str:
+    """Id, kind and name of a target, as three columns."""
+    if kind == "cell":
+        place = "inhabitable cell" if bake.graph.inhabitable[target] else "wall, sliver or exterior cell"
+        return f"cell {target} | {place} | {bake.graph.cell_names[target]}"
+    placed = bake.scene.objects[target]
+    name = " ".join(placed.name.replace("|", "/").split())
+    return f"object {target} | {placed.kind} ({placed.role.value}) | {name}"
 
 
 def _numbers(bake: "Bake") -> list[str]:
@@ -148,9 +221,17 @@ def _numbers(bake: "Bake") -> list[str]:
 
 def _set_table(bake: "Bake", chosen: dict[int, str]) -> list[str]:
     """One row for each chosen cell."""
-    seen, lines = _seen_counts(bake), ["| cell | name | potential | seen | overestimate |", "|---|---|---|---|---|"]
+    seen = _seen_counts(bake)
+    lines = [
+        "Cells that a cell sees, itself included:",
+        "",
+        "| cell | name | potential | seen | overestimate | unknown |",
+    ]
+    lines.append("|---|---|---|---|---|---|")
     for cell in chosen:
         potential, known = int(bake.potential_cells[cell].sum()), int(seen[cell])
         ratio = f"{potential / known:.3f}" if known else "no witness"
-        lines.append(f"| {cell} | {bake.graph.cell_names[cell]} | {potential:,} | {known:,} | {ratio} |")
+        lines.append(
+            f"| {cell} | {bake.graph.cell_names[cell]} | {potential:,} | {known:,} | {ratio} | {potential - known:,} |"
+        )
     return lines
