@@ -9,10 +9,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.graph import OTHER_AXES, CellGraph
+from viewcell.data.scene_folder import write_scene
 from viewcell.verify.adjudicate import Judgement
 from viewcell.verify.aims import aim_points, cell_origins, frontier_points
+from viewcell.verify.bench import flood as flood_bench
+from viewcell.verify.bench import models as models_bench
 from viewcell.verify.casefile import WrongHidden, load_cases, read_case, write_case
 from viewcell.verify.sightline import Sightlines
 from viewcell.verify.walk import contact_links, portal_links
@@ -332,3 +336,28 @@ def test_rays_through_a_building_stay_in_the_transitive_closure(bare):
     result = verify(bake, rays=200_000)
     assert result.wrong_hidden == 0 and result.blocked == 0
     assert 20 < sum(c.by_rays for c in result.counts[:2]) / graph.inhabitable.sum() <= 38.6
+
+
+def columns_of(printed):
+    """The table's columns: head to the text of its only row."""
+    head, _, row = ([cell.strip() for cell in line.strip("|").split("|")] for line in printed.splitlines())
+    return dict(zip(head, row, strict=True))
+
+
+def test_bench_of_a_bare_graph(capsys, tmp_path):
+    if not (SHARED / "graphs" / "w48").exists():
+        pytest.skip("no shared graphs folder w48")
+    assert flood_bench.main([str(SHARED / "graphs" / "w48"), "--repeats", "1"]) == 0
+    row = columns_of(capsys.readouterr().out)
+    assert (row["cells"], row["portals"], row["ordered pairs"]) == ("182", "236", "6,994")
+    assert row["unknown"] == row["asymmetric pairs"] == "0" and row["its sources, cut"] == "182 of 182, 0 cut"
+    assert flood_bench.main([str(tmp_path)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_bench_of_a_model(capsys, tmp_path):
+    write_scene(make_office(floors=1, rooms_per_side=1, furnished=False), tmp_path / "tiny.scene")
+    assert models_bench.main([str(tmp_path / "tiny.scene"), "--rays", "20000"]) == 0
+    row = columns_of(capsys.readouterr().out)
+    assert row["model"] == "tiny.scene" and row["wrong hidden"] == "0" and "flood" in row["seconds by phase"]
+    assert row["undecided % of all pairs of cells"] == "0.0000" and row["witnesses confirmed, refuted"].endswith(", 0")
