@@ -4,6 +4,7 @@ import dataclasses
 import json
 import runpy
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow as pa
@@ -20,6 +21,7 @@ from viewcell.verify.bench import models as models_bench
 from viewcell.verify.casefile import WrongHidden, load_cases, read_case, write_case
 from viewcell.verify.sightline import Sightlines
 from viewcell.verify.walk import contact_links, portal_links
+from viewcell.workbench.bake import bake
 from viewcell.workbench.verify import make_judge, replay, verify
 
 HOUSE = runpy.run_path(str(Path(__file__).with_name("small_house.py")))
@@ -361,3 +363,18 @@ def test_bench_of_a_model(capsys, tmp_path):
     row = columns_of(capsys.readouterr().out)
     assert row["model"] == "tiny.scene" and row["wrong hidden"] == "0" and "flood" in row["seconds by phase"]
     assert row["undecided % of all pairs of cells"] == "0.0000" and row["witnesses confirmed, refuted"].endswith(", 0")
+
+
+def test_undecided_pairs_are_counted_among_the_unknown(tmp_path, monkeypatch):
+    made = bake(make_office(floors=1, rooms_per_side=1, furnished=False), tmp_path / "b")
+    verdicts = made.cell_to_cell["verdict"].to_pylist()
+    pairs = zip(made.cell_to_cell["cell_id"].to_pylist(), made.cell_to_cell["reached_cell_id"].to_pylist(), strict=True)
+    changed_row = next(number for number, (cell, reached) in enumerate(pairs) if cell != reached)
+    found = SimpleNamespace(verdict=np.array([2]))
+    monkeypatch.setattr(models_bench, "search_rounds", lambda model, boxes, rows: found if len(rows) == 1 else None)
+    assert "unknown" not in verdicts and models_bench.undecided_percent(made) == 0
+    made.cell_to_cell = changed(made.cell_to_cell, changed_row, verdict="unknown")
+    size = made.graph.inhabitable.sum() * made.graph.cell_count
+    assert models_bench.undecided_percent(made) == pytest.approx(100 / size)
+    found.verdict[:] = 1
+    assert models_bench.undecided_percent(made) == 0
