@@ -3,8 +3,9 @@
 A branch-and-bound over lines instead of portal sequences. Take the middle line of what is still possible and look up
 the blockers it crosses between source and target. None: VISIBLE, and the line is the witness. Else the line must pass
 blocker R on one of its four sides, and "crosses the plane of R below its low edge" is one more linear row of the
-stabbing system (kernels/stab.py): four children, disjoint, most of them empty at once. No child left: HIDDEN. Open
-space costs nothing however finely it was cut into cells, which is where portal sequences explode.
+stabbing system (kernels/stab.py). Where that plane cuts through the source or the target there are two more ways:
+leaving the source after it, entering the target before it, both linear again. Most children are empty at once; none
+left: HIDDEN. Open space costs nothing however finely it was cut into cells, which is where portal sequences explode.
 
 The blocker is the one that covers most of the shaft between the two boxes, not the first one met: a slab between two
 storeys ends the search at its root.
@@ -41,6 +42,9 @@ wp.set_module_options({"enable_backward": False})
 f64 = wp.float64
 
 MAX_BRANCHES = wp.constant(60)
+# Ways to miss a blocker: past one of its four sides, or by entering the target before its plane, or by leaving the
+# source after it. The last two exist only where the plane cuts through the target or the source.
+WAYS = wp.constant(6)
 # Levels, rows, two spare polygons and the failing cut, and the rows again for widening the witness.
 SLOT_SIZE = wp.constant((60 + 2) * (27 + 1 + 4 * 24) + 2 * 6 * 96 * 2 + 2 * (1 + 4 * 24) + 8)
 SPARES_SIZE = wp.constant(2 * (1 + 4 * 24) + 8)
@@ -217,6 +221,9 @@ def scan(
                     point = wp.vec3d((time + xi[0]) / w[0], (time + xi[1]) / w[1], (time + xi[2]) / w[2])
                     share = shares(lo, hi, axis, point, s_lo, s_hi, t_lo, t_hi)
                     value = strength(share)
+                    # A plane that cuts source or target leaves two more ways to miss the blocker.
+                    if lo[axis] < s_hi[axis] or cuts_target(lo[axis], t_lo[axis], strict):
+                        value -= f64(3.0)
                     if value > best_strength:
                         best_strength = value
                         best = wp.vec2i(link[1], side_order(share))
@@ -226,6 +233,57 @@ def scan(
         else:
             node = link[0]
     return best
+
+
+@wp.func
+def append_order(
+    work: wp.array(dtype=f64), lists: int, counts: vec6i, i: int, first: f64, j: int, second: f64
+) -> vec6i:
+    """The row "plane x_i = first is crossed before plane x_j = second": xi_i - xi_j >= w_i first - w_j second."""
+    p = int(0)
+    if i + j == 3:
+        p = 2
+    if i + j == 2:
+        p = 4
+    if i > j:
+        p += 1
+    append_entry(work, lists, p, counts[p], first, second)
+    out = counts
+    out[p] = out[p] + 1
+    return out
+
+
+@wp.func
+def cuts_target(plane: f64, t_lo: f64, strict: int) -> bool:
+    """Whether a sightline may be in the target before it crosses the blocker's plane, and so need not pass it."""
+    return plane > t_lo or (strict != 0 and plane >= t_lo)
+
+
+@wp.func
+def append_beyond(
+    work: wp.array(dtype=f64), lists: int, counts: vec6i, plane: f64, axis: int, corner: wp.vec3d, at_target: bool
+) -> vec6i:
+    """The rows "enters the target before the blocker's plane", or "leaves the source after it".
+
+    Args:
+        work: scratch.
+        lists: where the rows are.
+        counts: rows so far.
+        plane: of the blocker.
+        axis: it is perpendicular to.
+        corner: low corner of the target, or high corner of the source.
+        at_target: which of the two.
+    """
+    out = counts
+    for step in range(1, 3):
+        i = int(axis + step)
+        if i > 2:
+            i -= 3
+        if at_target:
+            out = append_order(work, lists, out, i, corner[i], axis, plane)
+        else:
+            out = append_order(work, lists, out, axis, plane, i, corner[i])
+    return out
 
 
 @wp.func
@@ -243,27 +301,10 @@ def append_side(
         below = False
     if inside:
         below = not below
-    # Below: the plane is crossed before the edge, T_axis(plane) < T_b(edge): xi_axis - xi_b >= w_axis plane - w_b edge.
-    i = int(axis)
-    j = int(b)
-    first = lo[axis]
-    second = edge
-    if not below:
-        i = b
-        j = axis
-        first = edge
-        second = lo[axis]
-    p = int(0)
-    if i + j == 3:
-        p = 2
-    if i + j == 2:
-        p = 4
-    if i > j:
-        p += 1
-    append_entry(work, lists, p, counts[p], first, second)
-    out = counts
-    out[p] = out[p] + 1
-    return out
+    # Below: the plane is crossed before the edge, T_axis(plane) < T_b(edge).
+    if below:
+        return append_order(work, lists, counts, axis, lo[axis], b, edge)
+    return append_order(work, lists, counts, b, edge, axis, lo[axis])
 
 
 @wp.func
@@ -394,7 +435,7 @@ def _search(
                             verdict = UNDECIDED
                             depth = -1
                             octant = 8
-                    elif frames[at + 1] == 4:
+                    elif frames[at + 1] == WAYS:
                         depth -= 1
                     else:
                         cursor = frames[at + 1]
@@ -415,10 +456,18 @@ def _search(
                             depth = -1
                             octant = 8
                         else:
-                            for earlier in range(cursor + 1):
-                                side = (frames[at + 2] >> (2 * earlier)) & 3
-                                grown = append_side(work, lists, grown, lo, hi, axis, side, earlier < cursor)
-                            answer = decide(work, lists, level, level + LEVEL_SIZE, spare, counts, grown)
+                            answer = HIDDEN
+                            if cursor < 4:
+                                for earlier in range(cursor + 1):
+                                    side = (frames[at + 2] >> (2 * earlier)) & 3
+                                    grown = append_side(work, lists, grown, lo, hi, axis, side, earlier < cursor)
+                                answer = decide(work, lists, level, level + LEVEL_SIZE, spare, counts, grown)
+                            elif cursor == 4 and cuts_target(lo[axis], t_lo[axis], pair[2]):
+                                grown = append_beyond(work, lists, grown, lo[axis], axis, t_lo, True)
+                                answer = decide(work, lists, level, level + LEVEL_SIZE, spare, counts, grown)
+                            elif cursor == 5 and lo[axis] < s_hi[axis]:
+                                grown = append_beyond(work, lists, grown, lo[axis], axis, s_hi, False)
+                                answer = decide(work, lists, level, level + LEVEL_SIZE, spare, counts, grown)
                             if answer == UNDECIDED:
                                 verdict = UNDECIDED
                             if answer == STABBED:
