@@ -203,7 +203,7 @@ def scan(
     leave = wp.min(w[0] * s_hi[0] - xi[0], wp.min(w[1] * s_hi[1] - xi[1], w[2] * s_hi[2] - xi[2]))
     enter = wp.max(w[0] * t_lo[0] - xi[0], wp.max(w[1] * t_lo[1] - xi[1], w[2] * t_lo[2] - xi[2]))
     best = wp.vec2i(-1, 0)
-    best_strength = f64(-1.0)
+    best_strength = f64(-100.0)
     node = int(0)
     count = tree.links.shape[0]
     while node < count:

@@ -41,9 +41,9 @@ def clear_segments(boxes: np.ndarray, origins: np.ndarray, ends: np.ndarray, str
     way = ends - origins
     for low, high in boxes:
         axis = int((high == low).argmax())
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):
             t = (low[axis] - origins[:, axis]) / way[:, axis]
-        point = origins + t[:, None] * way
+            point = origins + t[:, None] * way
         last = 1.0 - 1e-9 if strict else 1.0 + 1e-9
         hit = (t > 0) & (t < last)
         for other in OTHER_AXES[axis]:
@@ -74,7 +74,7 @@ def shown(source: np.ndarray, target: np.ndarray, boxes: np.ndarray, strict: boo
     if strict:
         # What counts is the way to the surface of the box: move the end to where the segment enters it.
         way = ends - origins
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):
             first = np.minimum((target[0] - origins) / way, (target[1] - origins) / way)
         enter = np.nan_to_num(first, nan=-np.inf).max(axis=1)
         keep = enter > 0
@@ -132,3 +132,26 @@ def test_a_row_of_cabinets_does_not_hide_its_own_front():
         blocker_tree(blockers_of(np.array([fronts]))), np.array([source, target], np.int32), np.array([[0, 1, 1]])
     )
     assert answers.verdict[0] == 1
+
+
+def test_a_line_called_visible_crosses_nothing():
+    """However weak the blockers on a line are, they are on it."""
+    tried = 0
+    for seed in range(400):
+        made = case(seed)
+        if made is None or not len(made[2]):
+            continue
+        source, target, boxes, strict = made
+        answers = launch_target_search(
+            blocker_tree(blockers_of(boxes)), np.stack([source, target]), np.array([[0, 1, int(strict)]]), cap=5000
+        )
+        if answers.verdict[0] != 1:
+            continue
+        sign = np.where((answers.octant[0] >> np.arange(3)) & 1, -1.0, 1.0)
+        w, xi = answers.line[0], answers.offset[0]
+        ends = [np.sort(box * sign, axis=0) for box in (source, target)]
+        leave, enter = (w * ends[0][1] - xi).min(), (w * ends[1][0] - xi).max()
+        segment = sign * (np.array([[leave], [enter]]) + xi) / w
+        assert clear_segments(boxes, segment[:1], segment[1:], strict)[0], f"seed {seed}"
+        tried += 1
+    assert tried > 100
