@@ -215,6 +215,15 @@ class FloodAnswers:
     tests: int
 
 
+def found_room(size: int, device: str) -> Found:
+    """Room for so many found pairs."""
+    found = Found()
+    found.count = wp.zeros(1, dtype=int, device=device)
+    found.pair = wp.empty(size, dtype=wp.vec3i, device=device)
+    found.line, found.offset = (wp.empty(size, dtype=wp.vec3d, device=device) for _ in range(2))
+    return found
+
+
 def launch_flood(
     graph: DeviceGraph,
     sources: np.ndarray,
@@ -239,14 +248,16 @@ def launch_flood(
     source = wp.array(np.ascontiguousarray(sources, np.int32), dtype=int, device=device)
     reached = wp.zeros((count, cells), dtype=wp.uint8, device=device)
     tests = wp.zeros((count, 8), dtype=int, device=device)
+    rooms: dict[int, Found] = {}
+    chunk = CHUNK if wp.get_device(device).is_cpu else max(CHUNK, GPU_ROOM // cells)
     gathered: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
 
     def launch(first: int, last: int, slots: int, scratch: wp.array, frames: wp.array) -> None:
-        room = (last - first) * cells
-        found = Found()
-        found.count = wp.zeros(1, dtype=int, device=device)
-        found.pair = wp.empty(room, dtype=wp.vec3i, device=device)
-        found.line, found.offset = (wp.empty(room, dtype=wp.vec3d, device=device) for _ in range(2))
+        # Each thread brings its own scratch, and keeps its own room for what it finds.
+        found = rooms.get(scratch.ptr)
+        if found is None:
+            found = rooms[scratch.ptr] = found_room(min(chunk, count) * cells, device)
+        found.count.zero_()
         for octant in octants:
             inputs = [graph, source, first, last, octant, cap, scratch, frames, reached, tests, found]
             wp.launch(_flood, dim=slots, inputs=inputs, device=device)
@@ -254,7 +265,6 @@ def launch_flood(
         gathered.append(tuple(x[:used].numpy().copy() for x in (found.pair, found.line, found.offset)))
 
     sizes = SlotSizes(int(SLOT_SIZE), (int(MAX_DEPTH) + 1) * int(FRAME))
-    chunk = CHUNK if wp.get_device(device).is_cpu else max(CHUNK, GPU_ROOM // cells)
     run_sliced(launch, count, sizes, module=__name__, threads=threads, device=device, chunk=chunk)
     pairs, line, offset = (np.concatenate(column) for column in zip(*gathered, strict=True))
     order = np.lexsort((pairs[:, 1], pairs[:, 0]))

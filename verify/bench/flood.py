@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ...data.database import VisibleRows
 from ...data.errors import InputError
 from ...data.graph import CellGraph
 from ...data.graph_folder import read_graph
-from ...kernels.cell_visibility import CellRows
 from ...kernels.engine import Engine
 from ...kernels.flood import launch_flood
 from .timing import commit, median_range, print_head, print_row, quiet
@@ -43,7 +43,7 @@ HEAD = (
 )
 
 
-def asymmetric(rows: CellRows, graph: CellGraph) -> int:
+def asymmetric(rows: VisibleRows, graph: CellGraph) -> int:
     """Pairs of inhabitable cells of which just one sees the other."""
     potential = np.zeros((graph.cell_count, graph.cell_count), bool)
     potential[rows.source, rows.target] = True
@@ -51,14 +51,15 @@ def asymmetric(rows: CellRows, graph: CellGraph) -> int:
     return int((potential != potential.T).sum()) // 2
 
 
-def timed_floods(graph: CellGraph, repeats: int) -> tuple[dict[int, list[float]], CellRows]:
+def timed_floods(graph: CellGraph, repeats: int) -> tuple[dict[int, list[float]], VisibleRows]:
     """Seconds of the visibility phase by thread count, in turn, after one run to warm up; and the rows found."""
     engines = {t: Engine(None, graph, None, seed=0, threads=t, device="cpu") for t in THREADS}
     sources = np.flatnonzero(graph.inhabitable)
     spent: dict[int, list[float]] = {t: [] for t in THREADS}
     for engine in engines.values():
         engine.compile()
-    rows = engines[THREADS[0]].visible(sources).cells
+    part = engines[THREADS[0]].visible(sources)
+    rows = part.cells
     for _ in range(repeats):
         for threads, engine in engines.items():
             start = time.perf_counter()
@@ -66,7 +67,8 @@ def timed_floods(graph: CellGraph, repeats: int) -> tuple[dict[int, list[float]]
             spent[threads].append(time.perf_counter() - start)
             if not (np.array_equal(again.source, rows.source) and np.array_equal(again.target, rows.target)):
                 raise AssertionError(f"{threads} threads: the answer differs from that of {THREADS[0]}")
-    return spent, rows
+    # A witness found from one end serves both, once the rows are joined as a bake joins them.
+    return spent, engines[THREADS[0]].join([part])[0]
 
 
 def plain_search(graph: CellGraph, limit_s: float) -> tuple[float, int, int]:
