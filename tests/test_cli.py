@@ -72,7 +72,7 @@ def test_bake_prints_and_verify_confirms(graph, tmp_path, capsys):
     assert main(["bake", str(graph), "--out", str(out), "--no-progress"]) == 0
     text = capsys.readouterr().out
     assert "4 cells, 4 inhabitable" in text and "3 portals, 0 objects" in text
-    assert ["cells,", "all", "14", "14", "1.000", "0.00", "%"] in [line.split() for line in text.splitlines()]
+    assert ["cells,", "inhabitable", "14", "14", "1.000", "0.00", "%"] in [line.split() for line in text.splitlines()]
     assert text.splitlines()[-1] == f"written to {out}"
     assert main(["bake", str(graph), "--out", str(out), "--no-progress"]) == 0
     assert "was up to date" in capsys.readouterr().out
