@@ -28,6 +28,8 @@ QUANTUM = wp.constant(wp.float64(1024.0))
 # Points drawn on an object before giving up that one falls into the wanted box.
 PICKS = wp.constant(64)
 NEAR_PICKS = wp.constant(6)
+# Sightlines near a hint move by a share of the box down to two to this power, evenly in the exponent.
+NEAREST = wp.constant(wp.float64(-6.0))
 # A witness on an object must hit it within this multiple of its length (the check grants 1.001).
 PROLONGED = wp.constant(wp.float64(1.0005))
 
@@ -248,7 +250,7 @@ def _aim(
                 share = wp.vec3d(f64(wp.randf(state)), f64(wp.randf(state)), f64(wp.randf(state)))
                 end = point_at(real(aims.target_lo[row]), real(aims.target_hi[row]), share)
                 if near == 1 and attempt % 2 == 1:
-                    reach = f64(1.0) / f64(1 + attempt)
+                    reach = wp.pow(f64(2.0), NEAREST * f64(wp.randf(state)))
                     origin = pull(origin, aims.hint_origin[row], reach)
                     end = pull(end, aims.hint_end[row], reach)
             else:
@@ -399,7 +401,7 @@ def launch_aim(
         owners: object to hit, or -1 to reach a point of the target box.
         ranges: the object's first and past-the-last row in `targets`, shape (n, 2), int.
         seeds: of each row's random stream, shape (n,), int.
-        near: rows whose every other sightline stays near the hint, nearer and nearer, shape (n,), bool.
+        near: rows whose every other sightline stays near the hint, shape (n,), bool.
         tries: sightlines shot a row at most.
         boxed: aim only at the part of the object inside the row's box (most of the time: a part that random points on
             the object rarely hit is given up, and the point is used as it is).
