@@ -18,7 +18,6 @@ import warp as wp
 
 # Ordered pairs of axes, two lists a pair: list 2u holds (a, b) = (lo_i, hi_j), list 2u + 1 holds (lo_j, hi_i).
 # Unordered pair u: 0 = (x, y), 1 = (y, z), 2 = (x, z).
-LIST_COUNT = wp.constant(6)
 # Entries a list can hold: a portal sequence longer than this is answered UNKNOWN.
 LIST_CAPACITY = wp.constant(96)
 LISTS_SIZE = wp.constant(6 * 96 * 2)
@@ -434,6 +433,14 @@ def clip_spare(work: wp.array(dtype=f64), current: int, spare_a: int, spare_b: i
 
 
 @wp.func
+def report_failing(work: wp.array(dtype=f64), failing: int, g: wp.vec4d, polygon: int):
+    """Store the cut that left nothing and where the polygon is that it emptied."""
+    for c in range(4):
+        work[failing + c] = g[c]
+    work[failing + 4] = f64(polygon)
+
+
+@wp.func
 def decide(
     work: wp.array(dtype=f64), lists: int, inherited: int, level: int, spare: int, before: vec6i, counts: vec6i
 ) -> int:
@@ -461,11 +468,7 @@ def decide(
             g = slope_cut(work, level, bound)
             answer, at = clip_spare(work, current, spare, spare_b, g)
             if answer == 0:
-                work[failing] = g[0]
-                work[failing + 1] = g[1]
-                work[failing + 2] = g[2]
-                work[failing + 3] = g[3]
-                work[failing + 4] = f64(current)
+                report_failing(work, failing, g, current)
                 return HIDDEN
             current = at
     verdict = UNDECIDED
@@ -484,11 +487,7 @@ def decide(
             g = cycle_cut(work, lists, m, arg)
             answer, at = clip_spare(work, current, spare, spare_b, g)
             if answer == 0:
-                work[failing] = g[0]
-                work[failing + 1] = g[1]
-                work[failing + 2] = g[2]
-                work[failing + 3] = g[3]
-                work[failing + 4] = f64(current)
+                report_failing(work, failing, g, current)
                 return HIDDEN
             if answer >= 2:
                 # Too thin for integers: the unrounded direction, with a bound on what rounding can do to a cycle sum

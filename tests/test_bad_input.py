@@ -4,7 +4,6 @@ import errno
 import json
 import os
 import runpy
-import shutil
 from pathlib import Path
 
 import pyarrow as pa
@@ -18,24 +17,6 @@ ROOMS = runpy.run_path(str(Path(__file__).with_name("four_rooms.py")))
 write_graph, hashes = ROOMS["write_graph"], ROOMS["hashes"]
 CELLS = ROOMS["CELLS"]
 CUBE = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))
-
-
-@pytest.fixture(scope="module")
-def graph(tmp_path_factory):
-    return write_graph(tmp_path_factory.mktemp("graph") / "rooms")
-
-
-@pytest.fixture(scope="module")
-def baked(graph, tmp_path_factory):
-    """A finished bake of the four rooms; tests copy it before they change it."""
-    out = tmp_path_factory.mktemp("baked") / "rooms.bake"
-    assert main(["bake", str(graph), "--out", str(out), "--no-progress"]) == 0
-    return out
-
-
-@pytest.fixture
-def copy(baked, tmp_path):
-    return Path(shutil.copytree(baked, tmp_path / "copy.bake"))
 
 
 def refused(capsys, *arguments):

@@ -2,7 +2,6 @@
 
 import json
 import runpy
-import shutil
 import signal
 import subprocess
 import sys
@@ -20,24 +19,6 @@ TABLES = ("meshes", "objects", "cells", "portals", "cell_to_cell", "cell_to_obje
 HEAVY = {"warp", "jax", "pyarrow", "numpy", "scipy", "trimesh", "ifcopenshell", "matplotlib", "embreex"}
 ROOMS = runpy.run_path(str(Path(__file__).with_name("four_rooms.py")))
 write_graph, hashes = ROOMS["write_graph"], ROOMS["hashes"]
-
-
-@pytest.fixture(scope="module")
-def graph(tmp_path_factory):
-    return write_graph(tmp_path_factory.mktemp("graph") / "rooms")
-
-
-@pytest.fixture(scope="module")
-def baked(graph, tmp_path_factory):
-    """A finished bake of the four rooms; tests copy it before they change it."""
-    out = tmp_path_factory.mktemp("baked") / "rooms.bake"
-    assert main(["bake", str(graph), "--out", str(out), "--no-progress"]) == 0
-    return out
-
-
-@pytest.fixture
-def copy(baked, tmp_path):
-    return Path(shutil.copytree(baked, tmp_path / "copy.bake"))
 
 
 def run(*arguments, **options):

@@ -96,7 +96,7 @@ def bake(
     """
     settings = settings or Settings()
     _check(settings, budget_s, threads, device)
-    out = Path(out) if out is not None else Path(f"{_name(model)}.bake")
+    out = Path(out) if out is not None else default_out(model)
     clock = Clock()
     scene, graph_folder = _open(model, settings)
     if out.exists() and not replaceable(out, "bake"):
@@ -164,9 +164,11 @@ def _open(model: Scene | str | Path, settings: Settings) -> tuple[Scene | None, 
     return read(path, doors=settings.doors), None
 
 
-def _name(model: Scene | str | Path) -> str:
+def default_out(model: Scene | str | Path) -> Path:
+    """Where a bake goes that was not told where: named after its model, in the current folder."""
     # `resolve` gives "." and ".." a name.
-    return "scene" if isinstance(model, Scene) else Path(model).resolve().stem or "model"
+    name = "scene" if isinstance(model, Scene) else Path(model).resolve().stem or "model"
+    return Path(f"{name}.bake")
 
 
 def _fingerprint(scene: Scene | None, graph_folder: Path | None, settings: Settings) -> str:

@@ -38,14 +38,13 @@ def make_office(options: argparse.Namespace) -> int:
 
 def bake(options: argparse.Namespace) -> int:
     """Bake a model and print what came of it."""
-    from .bake import Settings
+    from .bake import Settings, default_out
     from .bake import bake as compute
 
     _start_warp()
     model = Path(options.model)
     settings = Settings(threshold_m2=options.threshold, seed=options.seed, doors=options.doors or "open")
-    # `resolve` gives "." and ".." a name.
-    out = Path(options.out) if options.out else Path(f"{model.resolve().stem or 'model'}.bake")
+    out = Path(options.out) if options.out else default_out(model)
     before = _stamp(out)
     made = compute(
         _read(model, options),

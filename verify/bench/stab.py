@@ -4,10 +4,8 @@ Run `python -m viewcell.verify.bench.stab`; it needs highspy, which only develop
 """
 
 import statistics
-import subprocess
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import warp as wp
@@ -17,6 +15,7 @@ from ...data.verdict import Verdict
 from ...kernels import stab_batch
 from ...kernels.stab_batch import launch_stab
 from ..stab_exact import stab
+from .timing import commit
 
 SIZES = (3, 5, 8, 16)
 LISTS = 100_000
@@ -97,18 +96,9 @@ def row(name: str, size: int, count: int, spent: list[float], ratio: str, found:
     return f"{head} | {wrong[0]} | {wrong[1]} | {wrong[2]:.2f} | {commit()} |"
 
 
-def commit() -> str:
-    """Short name of the checked-out commit, or - outside a clone."""
-    here = Path(__file__).resolve().parent
-    found = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], cwd=here, capture_output=True, text=True, check=False
-    )
-    return found.stdout.strip() or "-"
-
-
 def main() -> None:
     """Print the table: one CPU thread, compile time excluded, wrong verdicts judged by the exact twin."""
-    wp.config.quiet = True
+    wp.config.log_level = wp.LOG_WARNING
     wp.load_module(stab_batch.__name__, device="cpu")
     print(
         "| boxes | stabbed % | lists | method, one thread | us a decision, median of 7 (range) | times the kernel's ",
