@@ -16,6 +16,8 @@ TWINS = {
     "launch_confirm": ("sightline", "sightline.Sightlines", "test_sightline_kernels.py"),
     "launch_aim": ("sightline", "sightline.Sightlines", "test_sightline_kernels.py"),
     "launch_walk": ("walk", "walk.portal_path", "test_walk.py"),
+    "launch_coverage": ("coverage", "coverage_exact.cover_polygon", "test_coverage.py"),
+    "launch_occludees": ("occludee", "coverage_exact.covers_box", "test_coverage.py"),
 }
 
 
