@@ -137,7 +137,7 @@ def test_a_closed_room_hides_what_is_outside():
 
 
 def test_a_wall_hides_what_is_behind_it_and_not_beside():
-    maps = coverage([10.5, 20.5, 30.5], [rectangle(0, 1000, (-2000, -2000), (2000, 2000))], resolution=64)
+    maps = coverage([10.5, 20.5, 30.5], [rectangle(0, 1000, (-900, -900), (900, 900))], resolution=64)
     assert covered(maps, [[1050, -500, -500], [1800, 500, 500]])
     for box in ([[900, -500, -500], [1800, 500, 500]], [[1050, -500, -500], [1800, 4500, 500]], [[-9] * 3, [-1] * 3]):
         assert not covered(maps, box)
