@@ -119,8 +119,9 @@ def test_a_snapped_quadrilateral_is_one_occluder_though_no_plane_holds_it():
 
 @pytest.mark.parametrize("columns, rows", [(4, 1), (4, 3), (7, 7)])
 def test_a_grid_of_exactly_coplanar_triangles_is_one_rectangle(columns, rows):
-    patches = patches_of(surface(columns, rows, lambda u, v: (u * 1000, u * 500 + v * 100, v * 700 + u * 32)))
-    assert [len(outline) for outline in outlines(patches)] == [4]
+    triangles = surface(columns, rows, lambda u, v: (u * 1000, u * 500 + v * 100, v * 700 + u * 32))
+    for turned in (triangles, triangles[:, ::-1], triangles * [1, 1, -1], triangles[:, [1, 2, 0]] * [-1, 1, 1]):
+        assert [len(outline) for outline in outlines(patches_of(turned))] == [4]
 
 
 def test_a_snapped_grid_is_one_occluder_if_it_may_have_the_corners():
@@ -200,7 +201,8 @@ def test_owners_corners_and_folds_part_patches():
     assert sorted(parted.owner.tolist()) == [4, 9]
     folded = surface(2, 1, lambda u, v: (u * 300 + v, v * 400 + u * 3, 150 * abs(u - 1)))
     assert len(patches_of(folded).area) == 2
-    assert len(patches_of(folded, cos_limit=0.5).area) == 1
+    ridge = patches_of(folded, cos_limit=0.5)
+    assert np.diff(ridge.starts).tolist() == [6], "corners on the ridge are collinear in plan only"
 
 
 def test_small_patches_are_dropped():
@@ -208,6 +210,12 @@ def test_small_patches_are_dropped():
     area = patches_of(triangles).area[0]
     assert len(patches_of(triangles, least_area=area * 1.01).area) == 0
     assert len(patches_of(np.zeros((0, 3, 3), np.int32)).area) == 0
+    waves = surface(20, 20, lambda u, v: (u * 1000, v * 1000, 3000 * np.sin(u / 3) + 2000 * np.cos(v / 4)))
+    patches = patches_of(waves)
+    assert len(patches.area) < len(waves) / 4, "patches cover what others hold instead of what none does"
+    middle = float(np.median(patches.area))
+    large = patches_of(waves, least_area=middle)
+    assert 0 < len(large.area) < len(patches.area) and large.area.min() >= middle
 
 
 @pytest.mark.parametrize("options", [{"most_corners": 2}, {"cos_limit": 0.0}, {"cos_limit": 1.5}])
