@@ -50,6 +50,15 @@ class VisibleRows:
     portals: np.ndarray | None = None
 
 
+NO_CELL_ROWS = VisibleRows(
+    *(np.zeros(0, np.int32) for _ in range(2)),
+    np.zeros(0, bool),
+    *(np.zeros((0, 3)) for _ in range(2)),
+    np.zeros(1, np.int64),
+    np.zeros(0, np.int32),
+)
+
+
 class Bake:
     """A finished bake: the model, its cells and portals, and what is visible from where.
 
@@ -68,8 +77,13 @@ class Bake:
 
     @cached_property
     def graph(self) -> CellGraph:
-        """Cells and portals [grid steps]."""
-        return read_graph(self.folder, self.grid_m)[0]
+        """Cells and portals [grid steps]; view cells have no portals and may overlap."""
+        return read_graph(self.folder, self.grid_m, disjoint=self.claims_cells)[0]
+
+    @property
+    def claims_cells(self) -> bool:
+        """Whether the bake says which cells see each other; a bake of view cells speaks of objects only."""
+        return "cell_to_cell" in self.manifest.get("claims", ["cell_to_cell"])
 
     @cached_property
     def scene(self) -> Scene | None:
@@ -81,7 +95,9 @@ class Bake:
 
     @cached_property
     def cell_to_cell(self) -> pa.Table:
-        """Reached cells: verdict, portal sequence and witness [m]."""
+        """Reached cells: verdict, portal sequence and witness [m]; no rows in a bake that claims nothing of cells."""
+        if not self.claims_cells:
+            return _cell_to_cell_table(NO_CELL_ROWS, self.grid_m)
         return read_table(self.folder / "cell_to_cell.parquet", CELL_TO_CELL)
 
     @cached_property
@@ -91,7 +107,12 @@ class Bake:
 
     @cached_property
     def potential_cells(self) -> np.ndarray:
-        """Potentially visible cells, shape (cells, cells), bool; rows of inhabitable cells only."""
+        """Potentially visible cells, shape (cells, cells), bool; rows of inhabitable cells only.
+
+        All of them in a bake that claims nothing of cells.
+        """
+        if not self.claims_cells:
+            return np.repeat(self.graph.inhabitable[:, None], self.graph.cell_count, axis=1)
         return self._matrix(self.cell_to_cell, "reached_cell_id", self.graph.cell_count)
 
     @cached_property
@@ -172,7 +193,7 @@ def write_bake(
     manifest: Callable[[], dict],
     scene: Scene | None,
     graph: CellGraph,
-    cell_rows: VisibleRows,
+    cell_rows: VisibleRows | None,
     object_rows: VisibleRows,
     grid_m: float,
 ) -> Bake:
@@ -189,9 +210,10 @@ def write_bake(
         "objects": objects_table(scene or empty),
         "cells": _cells_table(graph, grid_m),
         "portals": _portals_table(graph, grid_m),
-        "cell_to_cell": _cell_to_cell_table(cell_rows, grid_m),
         "cell_to_object": _cell_to_object_table(object_rows, grid_m),
     }
+    if cell_rows is not None:
+        tables["cell_to_cell"] = _cell_to_cell_table(cell_rows, grid_m)
 
     with new_folder(folder, kind="bake") as temporary:
         for name, table in tables.items():

@@ -31,8 +31,13 @@ def numbers(table: pa.Table, names: tuple[str, ...], path: Path) -> np.ndarray:
     return out.reshape(table.num_rows, len(names))
 
 
-def read_graph(folder: Path, grid_m: float = GRID_M) -> tuple[CellGraph, float]:
+def read_graph(folder: Path, grid_m: float = GRID_M, *, disjoint: bool = True) -> tuple[CellGraph, float]:
     """The graph of a folder, snapped to the grid, and the largest displacement by snapping [m].
+
+    Args:
+        folder: with cells.parquet and portals.parquet.
+        grid_m: grid step [m].
+        disjoint: refuse cells that overlap; view cells may.
 
     Raises:
         InputError: the tables are unreadable or contradict each other or themselves.
@@ -49,19 +54,20 @@ def read_graph(folder: Path, grid_m: float = GRID_M) -> tuple[CellGraph, float]:
     metres = numbers(table, CELL_COLUMNS[1:], cells_path).reshape(-1, 2, 3)[np.argsort(ids)]
     cells, moved = _snap(metres, grid_m, cells_path)
     order = np.argsort(ids)
-    inhabitable = _optional(table, "inhabitable", True)[order].astype(bool)
-    names = _optional(table, "name", "")[order]
+    inhabitable = optional_column(table, "inhabitable", True)[order].astype(bool)
+    names = optional_column(table, "name", "")[order]
     portals = read_table(portals_path, PORTAL_COLUMNS)
     ends = numbers(portals, ("cell_a", "cell_b", "axis"), portals_path).astype(np.int64)
     flat = numbers(portals, PORTAL_COLUMNS[4:], portals_path)
     _check_ids(ends, len(ids), portals_path)
     boxes, portals_moved = _snap(_portal_boxes(ends[:, 2], flat), grid_m, portals_path)
     graph = CellGraph(cells, inhabitable, names, ends[:, :2].astype(np.int32), ends[:, 2].astype(np.int8), boxes)
-    check_graph(graph, str(folder))
+    check_graph(graph, str(folder), disjoint=disjoint)
     return graph, max(moved, portals_moved)
 
 
-def _optional(table: pa.Table, name: str, default: object) -> np.ndarray:
+def optional_column(table: pa.Table, name: str, default: object) -> np.ndarray:
+    """A column with nulls replaced, or the default in every row where there is none; dtype object."""
     if name in table.column_names:
         return np.array([default if value is None else value for value in table[name].to_pylist()], object)
     return np.full(table.num_rows, default, object)
@@ -97,8 +103,8 @@ def _portal_boxes(axis: np.ndarray, flat: np.ndarray) -> np.ndarray:
     return boxes
 
 
-def check_graph(graph: CellGraph, where: str) -> None:
-    """Cells have volume and do not overlap; each portal has area and lies on the face that its two cells share.
+def check_graph(graph: CellGraph, where: str, *, disjoint: bool = True) -> None:
+    """Cells have volume and (if `disjoint`) do not overlap; each portal has area and lies on its cells' common face.
 
     Raises:
         InputError: something does not hold.
@@ -106,7 +112,7 @@ def check_graph(graph: CellGraph, where: str) -> None:
     flat = np.flatnonzero((graph.cells[:, 1] <= graph.cells[:, 0]).any(axis=1))
     if len(flat):
         raise InputError(f"{where}: expected cells with min below max, found cell {flat[0]} without volume")
-    pair = first_overlap(graph.cells)
+    pair = first_overlap(graph.cells) if disjoint else None
     if pair is not None:
         raise InputError(
             f"{where}: expected cells that do not overlap, found cells {pair[0]} and {pair[1]} overlapping"

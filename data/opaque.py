@@ -16,6 +16,8 @@ from .graph import OTHER_AXES
 # steps.
 OBLIQUE_STEPS = 12
 OBLIQUE_STEP = 64
+# What comes within so many grid steps of an edge that was rounded to the grid is not called covered.
+ROUNDED_REACH = 2
 
 
 @dataclass
@@ -70,9 +72,35 @@ def plane_rectangles(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS) 
     Returns:
         Rectangles, shape (n, 2, 2), int32 (low, high corner); their area; the area dropped along oblique outlines.
     """
-    edges = _outline(triangles.astype(np.int64))
+    return edge_rectangles(_outline(triangles.astype(np.int64)), oblique_steps)
+
+
+def edge_rectangles(
+    edges: np.ndarray,
+    oblique_steps: int = OBLIQUE_STEPS,
+    *,
+    rounded: np.ndarray | None = None,
+    anywhere: bool = False,
+) -> tuple[np.ndarray, float, float]:
+    """Disjoint rectangles inside closed outlines.
+
+    Args:
+        edges: directed edges (from, to) x (u, v) [grid steps], shape (m, 2, 2), int64; as many leave a point as reach
+            it.
+        oblique_steps: as in `opaque_planes`.
+        rounded: edges that may be off by half a step; what comes within ROUNDED_REACH of them is left out. By default
+            none; shape (m,), bool.
+        anywhere: inside is where the winding number is not 0; otherwise where it is positive.
+
+    Returns:
+        As `plane_rectangles`.
+    """
     oblique = (edges[:, 0] != edges[:, 1]).all(axis=1)
-    us, vs = (_breaks(edges, oblique, c, oblique_steps) for c in (0, 1))
+    doubtful = edges[rounded] if rounded is not None else edges[:0]
+    us, vs = (
+        np.unique(np.concatenate([_breaks(edges, oblique, c, oblique_steps), *_beside(doubtful[:, :, c].ravel())]))
+        for c in (0, 1)
+    )
     winding = np.zeros((len(us), len(vs)), np.int64)
     steep = edges[~oblique & (edges[:, 0, 0] == edges[:, 1, 0])]
     columns = np.searchsorted(us, steep[:, 0, 0])
@@ -83,7 +111,10 @@ def plane_rectangles(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS) 
     crossed = np.zeros((len(us) - 1, len(vs) - 1), bool)
     for a, b in edges[oblique]:
         _add_oblique(a, b, us, vs, winding, crossed)
-    covered = winding.cumsum(axis=0)[:-1, :-1] > 0
+    for a, b in doubtful:
+        _mark_near(a, b, us, vs, crossed)
+    winding = winding.cumsum(axis=0)[:-1, :-1]
+    covered = winding != 0 if anywhere else winding > 0
     size = np.outer(np.diff(us), np.diff(vs)).astype(float)
     kept = covered & ~crossed
     lost = float(size[crossed & covered].sum())
@@ -119,8 +150,33 @@ def _breaks(edges: np.ndarray, oblique: np.ndarray, c: int, most: int) -> np.nda
     return np.unique(np.concatenate([edges[:, :, c].ravel(), *extra]))
 
 
+def _beside(coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Raster lines that keep what is lost beside a rounded edge thin."""
+    return coordinates - ROUNDED_REACH, coordinates + ROUNDED_REACH
+
+
+def _mark_near(a: np.ndarray, b: np.ndarray, us: np.ndarray, vs: np.ndarray, crossed: np.ndarray) -> None:
+    """Mark the raster cells that come within ROUNDED_REACH of the edge ab."""
+    if abs(int(b[0]) - int(a[0])) > abs(int(b[1]) - int(a[1])):
+        _mark_near(a[::-1], b[::-1], vs, us, crossed.T)
+        return
+    low, high = (a, b) if a[1] <= b[1] else (b, a)
+    slope = (high[0] - low[0]) / max(high[1] - low[1], 1)
+    first = max(int(np.searchsorted(vs, low[1] - ROUNDED_REACH, side="right")) - 1, 0)
+    for row in range(first, min(int(np.searchsorted(vs, high[1] + ROUNDED_REACH)), len(vs) - 1)):
+        # The slope is at most 1: reaching further along v moves the edge no further along u.
+        ends = [low[0] + (np.clip(v, low[1], high[1]) - low[1]) * slope for v in (vs[row], vs[row + 1])]
+        start = max(int(np.searchsorted(us, min(ends) - 2 * ROUNDED_REACH, side="right")) - 1, 0)
+        crossed[start : int(np.searchsorted(us, max(ends) + 2 * ROUNDED_REACH)), row] = True
+
+
 def _add_oblique(
-    a: np.ndarray, b: np.ndarray, us: np.ndarray, vs: np.ndarray, winding: np.ndarray, crossed: np.ndarray
+    a: np.ndarray,
+    b: np.ndarray,
+    us: np.ndarray,
+    vs: np.ndarray,
+    winding: np.ndarray,
+    crossed: np.ndarray,
 ) -> None:
     """Count one oblique edge into the winding differences and mark the raster cells that it may cross."""
     sign = -1 if b[1] > a[1] else 1

@@ -1,45 +1,124 @@
 """Visibility of a prepared model, a block of sources at a time."""
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import warp as wp
 
-from ..data.blockers import find_blockers
+from ..data.blockers import Blockers, find_blockers
 from ..data.database import VisibleRows
 from ..data.graph import CellGraph
 from ..data.incidence import populate
+from ..data.occludees import find_occludees
 from ..data.opaque import OpaquePlanes, opaque_planes
+from ..data.patches import find_patches
+from ..data.regions import find_regions
 from ..data.scene import Role, Scene
 from ..data.solids import SolidIndex, closed_elements
-from . import cell_visibility, flood, object_visibility, sightline, target, walk
+from . import cell_visibility, flood, object_visibility, occlusion, shaft, sightline, target, walk
 from .cell_visibility import CellRows, Model, cell_rows, join_rows, portal_rows, search_rounds, segments
 from .flood import launch_flood
 from .object_visibility import ObjectModel, ObjectRows, object_rows
-from .sightline import aim_targets, device_triangles
+from .occlusion import Occlusion, device_occluders, hidden_boxes, refine_objects, seen_objects
+from .sightline import AimTargets, Triangles, aim_targets, device_triangles
 from .target import TargetAnswers
 
 # A flood is tried on this many sources first; where more than a quarter run into the cap, sequences explode.
 SAMPLE = 24
 # Smaller pieces of furniture hide little and would fill the hierarchy of blockers.
 BLOCKING_DETAIL_M2 = 0.1
+# Oblique surfaces below this hide little.
+PATCH_M2 = 0.1
+# View cells and pieces are not halved below this, and a proof has at most so many pieces.
+SMALLEST_M = (0.25, 0.25)
+SHAFT_CAP = 2000
+# With "auto" the occluders are asked about cells of whose potential objects more than this share is unknown.
+AUTO_UNKNOWN = 0.02
+NO_PLANES = OpaquePlanes([np.zeros((0, 2, 3), np.int32)] * 3, 0.0, 0.0)
 
 
 @dataclass
 class Part:
     """Rows of one block of sources."""
 
-    cells: CellRows
+    cells: CellRows | None
     objects: ObjectRows
 
     @property
     def unknown_count(self) -> int:
         """Pairs without a witness."""
-        return int((~self.cells.seen).sum() + (~self.objects.seen).sum())
+        cells = 0 if self.cells is None else int((~self.cells.seen).sum())
+        return cells + int((~self.objects.seen).sum())
+
+
+class Sights:
+    """A model's triangles and solids, ready to be shot at."""
+
+    def __init__(self, scene: Scene, opaque: OpaquePlanes, cells: np.ndarray, device: str) -> None:
+        """Copy a model's triangles to the device.
+
+        Args:
+            scene: the model.
+            opaque: opaque rectangles of its occluders.
+            cells: that eyes are in [grid steps], shape (n, 2, 3), int32.
+            device: Warp device.
+        """
+        corners, owners = scene.triangles()
+        solid = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
+        self.opaque = with_details(scene, opaque)
+        self.triangles: Triangles = device_triangles(corners[solid], owners[solid], device)
+        self.targets: AimTargets = aim_targets(corners, device)
+        self.solids = SolidIndex(cells, closed_elements(scene))
+        starts = np.searchsorted(owners, np.arange(len(scene.objects) + 1))
+        self.ranges = np.column_stack([starts[:-1], starts[1:]])
+
+    def occlusion(
+        self,
+        scene: Scene,
+        cells: np.ndarray,
+        seed: int,
+        threads: int,
+        device: str,
+        blockers: Blockers | None = None,
+        shadows: bool = True,
+    ) -> Occlusion:
+        """The occluders and occludees of the model.
+
+        Args:
+            scene: the model.
+            cells: view cells.
+            seed: of the random sightlines.
+            threads: CPU threads.
+            device: Warp device.
+            blockers: of the model's portal graph, if they are to hide too.
+            shadows: whether occluders are to hide.
+        """
+        corners, owners = scene.triangles()
+        solid = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners] & shadows
+        patches = find_patches(corners[solid], owners[solid], least_area=PATCH_M2 / scene.grid_m**2)
+        regions = find_regions(scene, self.opaque if shadows else NO_PLANES, sections=shadows)
+        tree, shields = device_occluders(regions, patches, blockers, device)
+        return Occlusion(
+            find_occludees(scene),
+            tree,
+            shields,
+            self.triangles,
+            self.targets,
+            self.ranges,
+            self.solids,
+            cells,
+            tuple(round(size / scene.grid_m) for size in SMALLEST_M),
+            SHAFT_CAP,
+            seed,
+            threads,
+            device,
+        )
 
 
 class Engine:
-    """A model or a bare graph on a device, ready to answer."""
+    """A model or a bare graph on a device, ready to answer from its portal cells."""
 
     def __init__(
         self,
@@ -50,6 +129,7 @@ class Engine:
         seed: int,
         threads: int,
         device: str,
+        method: str = "portals",
     ) -> None:
         """Copy what visibility needs to the device.
 
@@ -60,26 +140,35 @@ class Engine:
             seed: of the random sightlines.
             threads: CPU threads.
             device: Warp device.
+            method: "portals"; "both" to ask the occluders about every pair that portals leave unknown; "auto" to ask
+                only where much is unknown. Without effect on a bare graph.
         """
         self.objects = None
         self.object_count = 0
-        triangles = targets = solids = opaque_rectangles = None
-        if scene is not None:
-            corners, owners = scene.triangles()
-            solid = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
-            opaque_rectangles = with_details(scene, opaque)
-            triangles = device_triangles(corners[solid], owners[solid], device)
-            targets = aim_targets(corners, device)
-            solids = SolidIndex(graph.cells, closed_elements(scene))
-            self.object_count = len(scene.objects)
-            starts = np.searchsorted(owners, np.arange(self.object_count + 1))
-            self.objects = ObjectModel(populate(scene, graph.cells), np.column_stack([starts[:-1], starts[1:]]))
-        blockers = find_blockers(graph, opaque_rectangles)
-        self.model = Model(graph, blockers, triangles, targets, solids, device, threads, seed)
+        self._scene = scene
+        self._least_unknown = {"portals": np.inf, "both": 0.0, "auto": AUTO_UNKNOWN}[method]
+        self._sights = None
+        if scene is None:
+            blockers = find_blockers(graph)
+            self.model = Model(graph, blockers, None, None, None, device, threads, seed)
+            return
+        self._sights = sights = Sights(scene, opaque, graph.cells, device)
+        self.object_count = len(scene.objects)
+        self.objects = ObjectModel(populate(scene, graph.cells), sights.ranges)
+        blockers = find_blockers(graph, sights.opaque)
+        self.model = Model(graph, blockers, sights.triangles, sights.targets, sights.solids, device, threads, seed)
+
+    @cached_property
+    def occlusion(self) -> Occlusion:
+        """Occluders of the model, made when they are first asked."""
+        model = self.model
+        return self._sights.occlusion(self._scene, model.graph.cells, model.seed, model.threads, model.device)
 
     def compile(self) -> None:
         """Load the kernels, so that their compilation is not counted as visibility."""
         modules = [target, walk, sightline] if self.objects is not None else [target, walk, flood]
+        if self.objects is not None and self._least_unknown == 0.0:
+            modules.append(shaft)
         for module in modules:
             wp.load_module(module.__name__, device=self.model.device)
 
@@ -95,7 +184,40 @@ class Engine:
             return Part(self._flood(block), no_objects())
         rounds = (cell_visibility.AIM_ROUNDS, object_visibility.AIM_ROUNDS) if aim else ((), ())
         cells = cell_rows(self.model, block, rounds[0])
-        return Part(cells, object_rows(self.model, self.objects, cells, rounds[1]))
+        if self._least_unknown == 0.0:
+            cells = self._hide_cells(cells)
+        objects = object_rows(self.model, self.objects, cells, rounds[1])
+        doubtful = ~objects.seen & self._unknown_sources(objects)[objects.source]
+        if doubtful.any():
+            objects = self._refine(objects, doubtful, aim)
+        return Part(cells, objects)
+
+    def _unknown_sources(self, rows: ObjectRows) -> np.ndarray:
+        """Cells of whose potential objects so many are unknown that the occluders are asked, shape (cells,), bool."""
+        count = self.model.graph.cell_count
+        unknown = np.bincount(rows.source[~rows.seen], minlength=count)
+        return unknown > self._least_unknown * np.bincount(rows.source, minlength=count)
+
+    def _hide_cells(self, rows: CellRows) -> CellRows:
+        """Rows without the unknown cells that occluders hide."""
+        todo = np.flatnonzero(~rows.seen & (rows.source != rows.target))
+        hidden = np.zeros(len(rows.source), bool)
+        hidden[todo] = hidden_boxes(self.occlusion, rows.source[todo], self.model.graph.cells[rows.target[todo]])
+        # Only rows with a witness have portals.
+        columns = [column[~hidden] for column in (rows.source, rows.target, rows.seen, rows.origin, rows.end)]
+        return CellRows(*columns, rows.portal_counts[~hidden], rows.portals)
+
+    def _refine(self, rows: ObjectRows, doubtful: np.ndarray, aim: bool) -> ObjectRows:
+        """Rows with the doubtful ones decided by occluders, as far as they can."""
+
+        def part(chosen: np.ndarray) -> list[np.ndarray]:
+            return [column[chosen] for column in (rows.source, rows.target, rows.seen, rows.origin, rows.end)]
+
+        better = refine_objects(self.occlusion, ObjectRows(*part(doubtful)), occlusion.AIM_ROUNDS if aim else ())
+        found = (better.source, better.target, better.seen, better.origin, better.end)
+        joined = [np.concatenate(pair) for pair in zip(part(~doubtful), found, strict=True)]
+        order = np.lexsort((joined[1], joined[0]))
+        return ObjectRows(*(column[order] for column in joined))
 
     def unknown(self, block: np.ndarray) -> Part:
         """Rows that claim nothing: every cell and object stays potential."""
@@ -104,21 +226,11 @@ class Engine:
         places = np.zeros((len(source), 3))
         nothing = np.zeros(len(source), bool)
         cells = CellRows(source, reached, nothing, places, places, np.zeros(len(source), int), np.zeros(0, np.int32))
-        source = np.repeat(block, self.object_count)
-        objects = np.tile(np.arange(self.object_count), len(block))
-        places = np.zeros((len(source), 3))
-        return Part(cells, ObjectRows(source, objects, np.zeros(len(source), bool), places, places))
+        return Part(cells, unknown_objects(block, self.object_count))
 
-    def join(self, parts: list[Part]) -> tuple[VisibleRows, VisibleRows]:
+    def join(self, parts: list[Part]) -> tuple[VisibleRows | None, VisibleRows]:
         """Tables of all blocks, made symmetric: A sees B exactly when B sees A."""
-        cells = join_rows(self.model, [part.cells for part in parts])
-        columns = [
-            np.concatenate([getattr(part.objects, name) for part in parts])
-            for name in ("source", "target", "seen", "origin", "end")
-        ]
-        order = np.lexsort((columns[1], columns[0]))
-        source, reached, seen, origin, end = (column[order] for column in columns)
-        return cells, VisibleRows(source.astype(np.int32), reached.astype(np.int32), seen, origin, end)
+        return join_rows(self.model, [part.cells for part in parts]), join_objects(parts)
 
     def _flood(self, sources: np.ndarray) -> CellRows:
         """Rows of a bare graph: portal sequences where they end soon, the target search for the rest."""
@@ -171,6 +283,89 @@ class Engine:
         cells = self.model.graph.cells
         origin, end = segments(answers, np.arange(len(source)), cells[source], cells[reached])
         return source, reached, origin, end
+
+
+class ViewCellEngine:
+    """A model on a device, ready to answer from view cells of any kind: about objects, not about cells."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        graph: CellGraph,
+        opaque: OpaquePlanes,
+        *,
+        seed: int,
+        threads: int,
+        device: str,
+        method: str = "occluders",
+        portal_graph: CellGraph | None = None,
+    ) -> None:
+        """Copy what visibility needs to the device; arguments as of `Engine`, the graph without portals.
+
+        Args:
+            scene: the model.
+            graph: view cells.
+            opaque: opaque rectangles of the model's occluders.
+            seed: of the random sightlines.
+            threads: CPU threads.
+            device: Warp device.
+            method: "occluders"; "portals", "both" to hide what no line between live cells of `portal_graph` reaches.
+            portal_graph: cells and portals of the model.
+        """
+        self.object_count = len(scene.objects)
+        self._solids = closed_elements(scene)
+        sights = Sights(scene, opaque, graph.cells, device)
+        blockers = None if portal_graph is None else find_blockers(portal_graph, sights.opaque)
+        self.model = sights.occlusion(scene, graph.cells, seed, threads, device, blockers, method != "portals")
+
+    def with_cells(self, cells: np.ndarray) -> "ViewCellEngine":
+        """The same engine for other view cells [grid steps], shape (n, 2, 3), int32."""
+        other = copy(self)
+        other.model = replace(self.model, cells=cells, solids=SolidIndex(cells, self._solids))
+        return other
+
+    def compile(self) -> None:
+        """Load the kernels, so that their compilation is not counted as visibility."""
+        for module in (target, shaft, sightline):
+            wp.load_module(module.__name__, device=self.model.device)
+
+    def visible(self, block: np.ndarray, *, aim: bool = True) -> Part:
+        """Rows of some view cells; without `aim` the same pairs are hidden and fewer of the others are seen."""
+        return Part(None, seen_objects(self.model, block, occlusion.AIM_ROUNDS if aim else ()))
+
+    def unknown(self, block: np.ndarray) -> Part:
+        """Rows that claim nothing: every object stays potential."""
+        return Part(None, unknown_objects(block, self.object_count))
+
+    def join(self, parts: list[Part]) -> tuple[VisibleRows | None, VisibleRows]:
+        """Tables of all blocks: none of cells, and objects."""
+        return None, join_objects(parts)
+
+
+def unknown_objects(block: np.ndarray, count: int) -> ObjectRows:
+    """Every object from every cell of the block, without a witness."""
+    source, target = np.repeat(block, count), np.tile(np.arange(count), len(block))
+    places = np.zeros((len(source), 3))
+    return ObjectRows(source, target, np.zeros(len(source), bool), places, places)
+
+
+def relabelled(part: Part, places: np.ndarray) -> Part:
+    """Object rows with cell c called places[c], and without those of cells whose place is -1."""
+    rows = part.objects
+    kept = np.flatnonzero(places[rows.source] >= 0)
+    columns = [column[kept] for column in (rows.target, rows.seen, rows.origin, rows.end)]
+    return Part(None, ObjectRows(places[rows.source[kept]], *columns))
+
+
+def join_objects(parts: list[Part]) -> VisibleRows:
+    """Objects of all blocks as one table, ordered by source, then target."""
+    columns = [
+        np.concatenate([getattr(part.objects, name) for part in parts])
+        for name in ("source", "target", "seen", "origin", "end")
+    ]
+    order = np.lexsort((columns[1], columns[0]))
+    source, reached, seen, origin, end = (column[order] for column in columns)
+    return VisibleRows(source.astype(np.int32), reached.astype(np.int32), seen, origin, end)
 
 
 def with_details(scene: Scene, opaque: OpaquePlanes) -> OpaquePlanes:

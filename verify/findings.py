@@ -126,10 +126,17 @@ class VerifyResult:
 def count_pairs(bake: "Bake", caster: Caster | None = None) -> list[Counts]:
     """Pairs by class of targets: inhabitable cells, other cells, objects; with what a caster's rays saw, if given."""
     inhabitable = bake.graph.inhabitable
-    tables = [
-        (name, bake.potential_cells[:, chosen], bake.cell_to_cell, "reached_cell_id", chosen)
-        for name, chosen in (("cells, inhabitable", inhabitable), ("cells, wall, sliver and exterior", ~inhabitable))
-    ]
+    tables = (
+        []
+        if not bake.claims_cells
+        else [
+            (name, bake.potential_cells[:, chosen], bake.cell_to_cell, "reached_cell_id", chosen)
+            for name, chosen in (
+                ("cells, inhabitable", inhabitable),
+                ("cells, wall, sliver and exterior", ~inhabitable),
+            )
+        ]
+    )
     tables.append(("objects", bake.potential_objects, bake.cell_to_object, "object_id", None))
     counts = []
     for name, potential, table, target, chosen in tables:

@@ -5,7 +5,7 @@ import json
 import pickle
 import shutil
 import time
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,13 +24,18 @@ from ..data.scene import GRID_LIMIT, GRID_M, Role, Scene
 from ..data.scene_folder import replaceable, scene_manifest
 from ..data.solids import closed_elements, dead_cells
 from ..data.subdivide import cut_rooms, merge, subdivide
+from ..data.view_cells import as_graph, octants, octree_roots, read_view_cells, walkable
 
 if TYPE_CHECKING:
-    from ..kernels.engine import Engine
+    from ..kernels.engine import Engine, Part, ViewCellEngine
 
 MARGIN_M = 2.0
 # Sources a block: a block is what an interrupted bake resumes from.
 BLOCK = 24
+METHODS = ("auto", "portals", "occluders", "both")
+# Models with more triangles than this are not cut into portal cells unless asked.
+PORTAL_TRIANGLES = 3_000_000
+DEEPEST = 12
 
 
 @dataclass(frozen=True)
@@ -42,12 +47,26 @@ class Settings:
         seed: of the random sightlines.
         seal: cracks narrower than this are closed [m]; 0 closes none.
         doors: "open", or "closed" if doors occlude.
+        method: "portals" (stabbing lines through a cell-and-portal graph), "occluders" (shadows of walls, furniture and
+            oblique surfaces), "both", or "auto": portals, and occluders for cells where portals leave much unknown or
+            where there are no rooms.
+        cells: view cells: "portals" for those of the graph, "octree", or a table of boxes. By default the method's own.
+        cell_size_m: of the octree's roots.
+        depth: times that a cell of the octree may be refined.
+        refine_triangles: a cell that may see more triangles is refined.
+        refine_gap: a cell is refined if a larger share of what it may see is unknown.
     """
 
     threshold_m2: float = 0.0
     seed: int = 0
     seal: float = 0.0
     doors: str = "open"
+    method: str = "auto"
+    cells: str = ""
+    cell_size_m: float = 4.0
+    depth: int = 2
+    refine_triangles: int = 100_000
+    refine_gap: float = 0.25
 
 
 @dataclass
@@ -104,21 +123,14 @@ def bake(
     print_ = _fingerprint(scene, graph_folder, settings)
     if not overwrite and (done := _finished(out, print_)) is not None:
         return done
-    if scene is None:
-        graph, snapped = read_graph(graph_folder)
-        opaque = None
-        clock.lap("read")
-        facts = {"source": str(graph_folder), "sha256": "", "unit": "metre", "grid_m": GRID_M, "origin": [0.0] * 3}
-        facts |= {"max_snap_m": snapped, "skipped": [], "counts": {"objects": 0}}
-    else:
-        facts = scene_manifest(scene)
-        graph, opaque, notes = build_graph(scene, settings, clock)
-        facts |= notes
+    prepared = _prepare(scene, graph_folder, settings, clock)
+    graph, facts = prepared.graph, prepared.facts
     if not graph.inhabitable.any():
         raise InputError(f"{facts['source']}: expected at least one inhabitable cell, found none")
     cell_rows, object_rows, spent = _visibility(
-        scene, graph, opaque, settings, out, print_, clock, budget_s, threads, device, progress
+        prepared, settings, out, print_, clock, budget_s, threads, device, progress
     )
+    graph = prepared.graph
     facts["budget_spent"] = spent
 
     def manifest() -> dict:
@@ -130,17 +142,89 @@ def bake(
     return made
 
 
+@dataclass
+class _Prepared:
+    """A model ready for visibility.
+
+    Attributes:
+        scene: None for a bare graph.
+        graph: its cells; view cells have no portals.
+        opaque: opaque rectangles of its occluders; None for a bare graph.
+        facts: what the manifest says of it.
+        view_cells: whether the cells are view cells, about which nothing but objects is claimed.
+        method: what "auto" came to.
+        portal_graph: the cell-and-portal graph beside view cells, if the method wants one.
+    """
+
+    scene: Scene | None
+    graph: CellGraph
+    opaque: OpaquePlanes | None
+    facts: dict
+    view_cells: bool
+    method: str
+    portal_graph: CellGraph | None = None
+
+
+def _prepare(scene: Scene | None, graph_folder: Path | None, settings: Settings, clock: Clock) -> _Prepared:
+    """Cells of a model, or of a bare graph."""
+    if scene is None:
+        if settings.method in ("occluders", "both") or settings.cells not in ("", "portals"):
+            raise InputError(f"{graph_folder}: expected a model for occluders and view cells, found a bare graph")
+        graph, snapped = read_graph(graph_folder)
+        clock.lap("read")
+        facts = {"source": str(graph_folder), "sha256": "", "unit": "metre", "grid_m": GRID_M, "origin": [0.0] * 3}
+        facts |= {"max_snap_m": snapped, "skipped": [], "counts": {"objects": 0}}
+        return _Prepared(None, graph, None, facts, False, "portals")
+    facts = scene_manifest(scene)
+    clock.lap("read")
+    cells, method = settings.cells, settings.method
+    large = len(scene.triangles()[0]) > PORTAL_TRIANGLES
+    if not cells:
+        cells = "octree" if method == "occluders" or (method == "auto" and large) else "portals"
+    if cells == "portals":
+        graph, opaque, notes = build_graph(scene, settings, clock)
+        if graph.inhabitable.any() or method != "auto" or settings.cells:
+            return _Prepared(scene, graph, opaque, facts | notes, False, method)
+        cells = "octree"
+    if method == "auto":
+        method = "occluders"
+    portal_graph = build_graph(scene, settings, clock)[0] if method != "occluders" else None
+    opaque = _opaque(scene)
+    if cells == "octree":
+        roots = octree_roots(scene, settings.cell_size_m)
+        graph = as_graph(roots[walkable(roots, scene, opaque)])
+        notes = {"inhabitable_because": "octree"}
+    else:
+        graph = read_view_cells(cells, scene)
+        notes = {"inhabitable_because": "given"}
+    clock.lap("view cells")
+    return _Prepared(scene, graph, opaque, facts | notes, True, method, portal_graph)
+
+
+def _opaque(scene: Scene) -> OpaquePlanes:
+    """Opaque rectangles of a model's occluders."""
+    triangles, owners = scene.triangles()
+    return opaque_planes(triangles[scene.object_mask(Role.OCCLUDER)[owners]])
+
+
 def _check(settings: Settings, budget_s: float | None, threads: int | None, device: str) -> None:
     for name, value, least in (
         ("threshold", settings.threshold_m2, 0.0),
         ("seal", settings.seal, 0.0),
         ("budget", budget_s if budget_s is not None else 1.0, 1e-9),
         ("threads", threads if threads is not None else 1, 1),
+        ("cell size", settings.cell_size_m, 1e-3),
+        ("refine-triangles", settings.refine_triangles, 1),
+        ("refine-gap", settings.refine_gap, 0.0),
     ):
         if not (np.isfinite(value) and value >= least):
             raise InputError(f"{name}: expected a number {'above 0' if least else 'from 0'}, found {value}")
     if settings.seal > 0:
         raise InputError(f"seal: expected 0 (closing cracks is not built yet), found {settings.seal}")
+    if settings.method not in METHODS:
+        raise InputError(f"method: expected {', '.join(METHODS)}, found {settings.method!r}")
+    if not 0 <= settings.depth <= DEEPEST:
+        raise InputError(f"depth: expected a whole number from 0 to {DEEPEST}, found {settings.depth}")
     import warp as wp
 
     # Warp greets whoever starts it, unless told not to before.
@@ -174,10 +258,11 @@ def default_out(model: Scene | str | Path) -> Path:
 def _fingerprint(scene: Scene | None, graph_folder: Path | None, settings: Settings) -> str:
     """Hash of everything that the answer depends on."""
     digest = hashlib.sha256(f"{__version__} {settings} {BLOCK}".encode())
+    if settings.cells not in ("", "portals", "octree"):
+        digest.update(_contents(Path(settings.cells)))
     if scene is None:
         for name in ("cells.parquet", "portals.parquet"):
-            path = graph_folder / name
-            digest.update(path.read_bytes() if path.is_file() else b"")
+            digest.update(_contents(graph_folder / name))
     else:
         for shape in scene.definitions:
             for mesh in shape.lods:
@@ -192,6 +277,11 @@ def _fingerprint(scene: Scene | None, graph_folder: Path | None, settings: Setti
     return digest.hexdigest()
 
 
+def _contents(path: Path) -> bytes:
+    """What is in a file; nothing if there is none."""
+    return path.read_bytes() if path.is_file() else b""
+
+
 def _finished(out: Path, print_: str) -> Bake | None:
     """The bake at `out`, if it is complete and of the same input, settings and version."""
     try:
@@ -204,10 +294,9 @@ def _finished(out: Path, print_: str) -> Bake | None:
 
 def build_graph(scene: Scene, settings: Settings, clock: Clock) -> tuple[CellGraph, OpaquePlanes, dict]:
     """Cells, portals and inhabitable cells of a model, its opaque rectangles, and what the manifest says of them."""
-    triangles, owners = scene.triangles()
+    triangles, _ = scene.triangles()
     clock.lap("read")
-    occluders = scene.object_mask(Role.OCCLUDER)
-    opaque = opaque_planes(triangles[occluders[owners]])
+    opaque = _opaque(scene)
     margin = round(MARGIN_M / scene.grid_m)
     # The grid's own limit is where the kernels stop being exact.
     low = np.maximum(triangles.min(axis=(0, 1)).astype(np.int64) - margin, -GRID_LIMIT)
@@ -237,9 +326,7 @@ def _partial(out: Path) -> Path:
 
 
 def _visibility(
-    scene: Scene | None,
-    graph: CellGraph,
-    opaque: OpaquePlanes | None,
+    prepared: _Prepared,
     settings: Settings,
     out: Path,
     print_: str,
@@ -248,15 +335,20 @@ def _visibility(
     threads: int | None,
     device: str,
     progress: bool,
-) -> tuple[VisibleRows, VisibleRows, bool]:
+) -> tuple[VisibleRows | None, VisibleRows, bool]:
     """Visibility of all inhabitable cells, block by block, and whether the budget ended it early.
 
-    Finished blocks are kept beside the target.
+    Finished blocks are kept beside the target. Cells of an octree are refined on the way: `prepared` has them all then.
     """
-    from ..kernels.engine import Engine
+    from ..kernels.engine import Engine, ViewCellEngine
     from ..kernels.launch import thread_count
 
-    engine = Engine(scene, graph, opaque, seed=settings.seed, threads=thread_count(threads), device=device)
+    scene, graph = prepared.scene, prepared.graph
+    options = {"seed": settings.seed, "threads": thread_count(threads), "device": device, "method": prepared.method}
+    if prepared.view_cells:
+        engine = ViewCellEngine(scene, graph, prepared.opaque, portal_graph=prepared.portal_graph, **options)
+    else:
+        engine = Engine(scene, graph, prepared.opaque, **options)
     clock.lap("prepare")
     engine.compile()
     clock.lap("compile")
@@ -264,16 +356,79 @@ def _visibility(
     blocks = [sources[i : i + BLOCK] for i in range(0, len(sources), BLOCK)] if scene is not None else [sources]
     store = _Store(_partial(out), print_)
     bar = tqdm(total=len(sources), unit="cell", desc="visibility", disable=not progress)
+    deadline = np.inf if budget_s is None else time.perf_counter() + budget_s
     if budget_s is None:
         parts, spent = [_finish_block(engine, store, number, block, bar) for number, block in enumerate(blocks)], False
     else:
-        parts, spent = _within(engine, store, blocks, time.perf_counter() + budget_s, bar)
+        parts, spent = _within(engine, store, blocks, deadline, bar)
+    if prepared.view_cells and prepared.facts["inhabitable_because"] == "octree":
+        parts, spent = _refine(prepared, engine, store, parts, settings, deadline, bar)
     bar.close()
     clock.lap("flood")
     return *engine.join(parts), spent
 
 
-def _finish_block(engine: "Engine", store: "_Store", number: int, block: np.ndarray, bar: tqdm) -> object:
+def _refine(
+    prepared: _Prepared,
+    engine: "ViewCellEngine",
+    store: "_Store",
+    parts: list["Part"],
+    settings: Settings,
+    deadline: float,
+    bar: tqdm,
+) -> tuple[list["Part"], bool]:
+    """Replace cells of an octree that may see too much, or know too little, by their octants, level by level."""
+    from ..kernels.engine import relabelled
+
+    scene = prepared.scene
+    sizes = np.bincount(scene.triangles()[1], minlength=len(scene.objects))
+    cells, kept, leaves, spent = prepared.graph.cells, [], [], False
+    for level in range(1, settings.depth + 2):
+        coarse = np.zeros(len(cells), bool)
+        if level <= settings.depth:
+            for part in parts:
+                coarse |= _too_coarse(part, len(cells), sizes, settings)
+        families = octants(cells[coarse]).reshape(-1, 8, 2, 3)
+        alive = walkable(families.reshape(-1, 2, 3), scene, prepared.opaque).reshape(-1, 8)
+        parents = np.flatnonzero(coarse)
+        fresh, fresh_cells = [], []
+        finer = engine.with_cells(families[alive].astype(np.int32))
+        ends = np.cumsum(alive.sum(axis=1))
+        bar.total += int(ends[-1]) if len(ends) else 0
+        bar.refresh()
+        first = 0
+        while first < len(parents):
+            if time.perf_counter() > deadline:
+                # What is left of this level stays as it is: unrefined, never hidden.
+                coarse[parents[first:]] = False
+                spent = True
+                break
+            # Whole families of about a block.
+            last = min(len(parents), first + max(1, BLOCK // 8))
+            block = np.arange(ends[first] - alive[first].sum(), ends[last - 1])
+            fresh.append(_finish_block(finer, store, f"{level}-{first}", block, bar))
+            fresh_cells.append(block)
+            first = last
+        place = np.cumsum(~coarse) - 1 + sum(map(len, leaves))
+        kept += [relabelled(part, np.where(coarse, -1, place)) for part in parts]
+        leaves.append(cells[~coarse])
+        count = int(sum(map(len, fresh_cells)))
+        cells, parts = families[alive].astype(np.int32)[:count], fresh
+        if not count:
+            break
+    prepared.graph = as_graph(np.concatenate(leaves))
+    return kept, spent
+
+
+def _too_coarse(part: "Part", count: int, sizes: np.ndarray, settings: Settings) -> np.ndarray:
+    """Cells of a part that should be refined, shape (count,), bool; sizes are triangles by object."""
+    rows = part.objects
+    potential, unknown = (np.bincount(chosen, minlength=count) for chosen in (rows.source, rows.source[~rows.seen]))
+    triangles = np.bincount(rows.source, sizes[rows.target], minlength=count)
+    return (triangles > settings.refine_triangles) | (unknown > settings.refine_gap * potential)
+
+
+def _finish_block(engine: "Engine", store: "_Store", number: int | str, block: np.ndarray, bar: tqdm) -> object:
     """A block as far as it goes, from the store if it is there."""
     part = store.load(number)
     if part is None:
@@ -317,14 +472,14 @@ class _Store:
         except OSError as error:
             raise InputError(f"{folder}: expected a place for unfinished work, found: {error.strerror}") from None
 
-    def load(self, number: int) -> object | None:
+    def load(self, number: int | str) -> object | None:
         """A finished block, or None."""
         try:
             return pickle.loads((self._folder / f"{number}.block").read_bytes())
         except Exception:  # pickle raises many types for a damaged file; the block is then computed again
             return None
 
-    def save(self, number: int, part: object) -> None:
+    def save(self, number: int | str, part: object) -> None:
         """Keep a block; a rename makes it appear whole or not at all."""
         try:
             temporary = self._folder / f"{number}.writing"
@@ -339,7 +494,7 @@ def _manifest(
     settings: Settings,
     print_: str,
     graph: CellGraph,
-    cell_rows: VisibleRows,
+    cell_rows: VisibleRows | None,
     object_rows: VisibleRows,
     clock: Clock,
 ) -> dict:
@@ -347,8 +502,10 @@ def _manifest(
         "cells": graph.cell_count,
         "inhabitable": int(graph.inhabitable.sum()),
         "portals": graph.portal_count,
-        "cell_pairs": len(cell_rows.source),
-        "cell_pairs_seen": int(cell_rows.seen.sum()),
+    }
+    if cell_rows is not None:
+        counts |= {"cell_pairs": len(cell_rows.source), "cell_pairs_seen": int(cell_rows.seen.sum())}
+    counts |= {
         "object_pairs": len(object_rows.source),
         "object_pairs_seen": int(object_rows.seen.sum()),
     }
@@ -358,12 +515,9 @@ def _manifest(
         "kind": "bake",
         "viewcell": __version__,
         "model": {"path": facts["source"], "sha256": facts["sha256"]},
-        "settings": {
-            "threshold_m2": settings.threshold_m2,
-            "seed": settings.seed,
-            "seal": settings.seal,
-            "doors": settings.doors,
-        },
+        "settings": asdict(settings),
+        # A folder of view cells says nothing about what cells see of each other, and has no cell_to_cell.parquet.
+        "claims": ["cell_to_object"] if cell_rows is None else ["cell_to_cell", "cell_to_object"],
         "fingerprint": print_,
         "counts": counts,
         "seconds": clock.seconds,

@@ -146,6 +146,30 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
     bake = _command(commands, "bake", "bake", "Compute what can be seen from each cell of a model.")
     bake.add_argument("model", metavar="MODEL", help="IFC, glTF, OBJ, PLY, STL, a scene folder, or cells and portals")
     bake.add_argument("--out", metavar="BAKE", help="folder to write; MODEL's name with .bake by default")
+    bake.add_argument(
+        "--method",
+        choices=["auto", "portals", "occluders", "both"],
+        default="auto",
+        help="what proves things hidden; auto, the default: portals in rooms, occluders where they fall short",
+    )
+    bake.add_argument(
+        "--cells",
+        default="",
+        metavar="FILE",
+        help="view cells: a Parquet or CSV table of boxes, or octree, or portals; the method's own by default",
+    )
+    bake.add_argument("--cell-size", type=_number, default=4.0, metavar="M", help="of an octree's roots; 4 by default")
+    bake.add_argument("--depth", type=_whole(0, 12), default=2, help="times an octree's cell is refined; 2 by default")
+    bake.add_argument(
+        "--refine-triangles", type=_whole(1), default=100_000, metavar="N", help="refine a cell that may see more"
+    )
+    bake.add_argument(
+        "--refine-gap",
+        type=_number,
+        default=0.25,
+        metavar="SHARE",
+        help="refine a cell if more of its set than this is unknown",
+    )
     bake.add_argument("--up", choices=["y", "z"], help="axis that points up in a mesh file")
     bake.add_argument("--unit", help="unit of a mesh file, a name or metres; metre by default")
     bake.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")

@@ -43,7 +43,17 @@ def bake(options: argparse.Namespace) -> int:
 
     _start_warp()
     model = Path(options.model)
-    settings = Settings(threshold_m2=options.threshold, seed=options.seed, doors=options.doors or "open")
+    settings = Settings(
+        threshold_m2=options.threshold,
+        seed=options.seed,
+        doors=options.doors or "open",
+        method=options.method,
+        cells=options.cells,
+        cell_size_m=options.cell_size,
+        depth=options.depth,
+        refine_triangles=options.refine_triangles,
+        refine_gap=options.refine_gap,
+    )
     out = Path(options.out) if options.out else default_out(model)
     before = _stamp(out)
     made = compute(

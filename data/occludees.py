@@ -1,0 +1,116 @@
+"""What may be hidden: a hierarchy over all objects, and each object as boxes around its pieces.
+
+One proof for a node of the hierarchy hides everything below it. The pieces keep the empty corners of an L-shaped or
+oblique object out of the question. Source: Chhugani et al. 2005, section 5.2, tests the polygons of an object; boxes
+around them are conservative.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .hierarchy import median_order
+from .incidence import CHUNK, clip_bounds
+from .scene import Scene
+
+# Pieces are no smaller than this, and at most PIECES along an axis of their object.
+PIECE_M = 0.5
+PIECES = 8
+# Bounds of a node that holds nothing.
+NOWHERE = 2**25
+
+
+@dataclass
+class Occludees:
+    """Objects and their pieces, in grid steps.
+
+    Attributes:
+        bounds: of each object, shape (objects, 2, 3), int32; low > high for one without triangles.
+        levels: node bounds of a perfect binary tree, one array (2**level, 2, 3), int32, a level; the last one's nodes
+            are objects.
+        objects: object of each node of the last level, -1 for none, int32.
+        pieces: boxes that together hold all triangles of their object, shape (pieces, 2, 3), int32.
+        starts: pieces of object o are starts[o]:starts[o + 1], shape (objects + 1,), int64.
+    """
+
+    bounds: np.ndarray
+    levels: list[np.ndarray]
+    objects: np.ndarray
+    pieces: np.ndarray
+    starts: np.ndarray
+
+
+def find_occludees(scene: Scene) -> Occludees:
+    """Occludees of all objects of a scene, opaque or not."""
+    bounds = scene.object_bounds()
+    present = np.flatnonzero((bounds[:, 0] <= bounds[:, 1]).all(axis=1))
+    levels, objects = _hierarchy(bounds[present])
+    objects = np.where(objects >= 0, present[objects], -1).astype(np.int32)
+    pieces, owner = _pieces(scene, bounds)
+    return Occludees(
+        bounds.astype(np.int32), levels, objects, pieces, np.searchsorted(owner, np.arange(len(bounds) + 1))
+    )
+
+
+def _hierarchy(boxes: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    """Node bounds level by level, and the box of each node of the last level, -1 for none."""
+    count = len(boxes)
+    depth = int(np.ceil(np.log2(count))) if count > 1 else 0
+    places = np.arange(count) * 2**depth // max(count, 1)
+    items = np.full(2**depth, -1, np.int64)
+    items[places] = median_order(boxes.sum(axis=1), places, depth)
+    bounds = np.empty((2**depth, 2, 3), np.int64)
+    bounds[:, 0], bounds[:, 1] = NOWHERE, -NOWHERE
+    bounds[items >= 0] = boxes[items[items >= 0]]
+    levels = [bounds.astype(np.int32)]
+    for _ in range(depth):
+        pairs = bounds.reshape(-1, 2, 2, 3)
+        bounds = np.stack([pairs[:, :, 0].min(axis=1), pairs[:, :, 1].max(axis=1)], axis=1)
+        levels.append(bounds.astype(np.int32))
+    return levels[::-1], items
+
+
+def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pieces of all objects in object order, and the object of each."""
+    triangles, owners = scene.triangles()
+    least = round(PIECE_M / scene.grid_m)
+    size = np.maximum(least, -(-(bounds[:, 1] - bounds[:, 0]) // PIECES))
+    keys, boxes = [np.zeros((0, 4), np.int64)], [np.zeros((0, 2, 3), np.int64)]
+    for begin in range(0, len(triangles), CHUNK):
+        t, owner = triangles[begin : begin + CHUNK].astype(np.int64), owners[begin : begin + CHUNK]
+        low, high = t.min(axis=1), t.max(axis=1)
+        base, step = bounds[owner, 0], size[owner]
+        first = (low - base) // step
+        # A triangle that ends on a border between two places reaches into the lower one only.
+        last = np.maximum(first, -(-(high - base) // step) - 1)
+        first = np.minimum(first, last)
+        span = last - first + 1
+        count = span.prod(axis=1)
+        row = np.repeat(np.arange(len(t)), count)
+        rest = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        place = np.empty((len(row), 3), np.int64)
+        for i in range(3):
+            place[:, i] = first[row, i] + rest % span[row, i]
+            rest = rest // span[row, i]
+        box = np.stack([low[row], high[row]], axis=1)
+        cut = np.flatnonzero(count[row] > 1)
+        corner = base[row[cut]] + place[cut] * step[row[cut]]
+        left, box[cut] = clip_bounds(t[row[cut]], np.stack([corner, corner + step[row[cut]]], axis=1))
+        kept = np.ones(len(row), bool)
+        kept[cut] = left
+        key, box = _join(np.column_stack([owner[row], place])[kept], box[kept])
+        keys.append(key)
+        boxes.append(box)
+    key, box = _join(np.concatenate(keys), np.concatenate(boxes))
+    return box.astype(np.int32), key[:, 0]
+
+
+def _join(keys: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes of equal keys joined, ordered by key."""
+    if not len(keys):
+        return keys, boxes
+    order = np.lexsort(keys.T[::-1])
+    keys, boxes = keys[order], boxes[order]
+    starts = np.flatnonzero(np.concatenate([[True], (keys[1:] != keys[:-1]).any(axis=1)]))
+    low, high = np.minimum.reduceat(boxes[:, 0], starts), np.maximum.reduceat(boxes[:, 1], starts)
+    return keys[starts], np.stack([low, high], axis=1)

@@ -1,0 +1,253 @@
+"""Which objects can be seen from view cells, proved with occluders alone: no rooms, no portals.
+
+Top down over the hierarchy of objects: a node that is hidden from a view cell is done with. What is left is first shot
+at, since most of it is visible; then its pieces are proved hidden one by one, by lines past axial rectangles
+(kernels/target.py, exact for them together) and by halving (kernels/shaft.py, which also knows oblique occluders). The
+middle of a piece that could not be proved is where the next sightlines are aimed.
+
+An eye counts only outside every solid, so a view cell may overlap walls and furniture.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data.blockers import Blockers
+from ..data.hierarchy import build_hierarchy
+from ..data.occludees import Occludees
+from ..data.patches import Patches
+from ..data.regions import Regions
+from ..data.solids import SolidIndex
+from .cell_visibility import seeds, segments
+from .object_visibility import ObjectRows
+from .shaft import ShaftAnswers, Shields, device_shields, launch_meets, launch_shaft
+from .sightline import AimTargets, Triangles, launch_aim
+from .target import BlockerTree, TargetAnswers, blocker_tree, launch_target_search
+
+# Sightlines aimed at each object that its box does not hide, then at those whose pieces are not hidden, round by round.
+FIRST_TRIES = 12
+AIM_ROUNDS = (32, 128, 512)
+# The root of the hierarchy is visible from everywhere: start where a level has some nodes.
+FIRST_LEVEL = 3
+# Lines tried for a node of the hierarchy, and for a piece.
+NODE_CAP, PIECE_CAP = 40, 2000
+# An object with so many pieces that could not be hidden is not looked at further: they are enough to aim at.
+OPEN_ENOUGH = 3
+
+
+@dataclass
+class Occlusion:
+    """What hides and what may be hidden, on the device.
+
+    Attributes:
+        occludees: objects and their pieces.
+        tree: axial rectangles.
+        shields: regions and patches.
+        triangles: opaque triangles.
+        targets: triangles of all objects.
+        ranges: first and past-the-last triangle of each object among the targets, shape (objects, 2).
+        solids: closed elements by view cell.
+        cells: view cells [grid steps], shape (cells, 2, 3), int32; they may overlap each other and solids.
+        smallest: sides of view cells and of pieces that are not halved below this [grid steps].
+        cap: halvings a piece.
+    """
+
+    occludees: Occludees
+    tree: BlockerTree
+    shields: Shields
+    triangles: Triangles
+    targets: AimTargets
+    ranges: np.ndarray
+    solids: SolidIndex
+    cells: np.ndarray
+    smallest: tuple[int, int]
+    cap: int
+    seed: int = 0
+    threads: int = 1
+    device: str = "cpu"
+
+
+def device_occluders(
+    regions: Regions, patches: Patches, blockers: Blockers | None, device: str
+) -> tuple[BlockerTree, Shields]:
+    """Occluders as the two searches want them; blockers of a portal graph serve the search of lines only."""
+    boxes, axis, hierarchy = regions.boxes, regions.axis[regions.region], regions.hierarchy
+    if blockers is not None:
+        boxes, axis = np.concatenate([blockers.boxes, boxes]), np.concatenate([blockers.axis, axis])
+        hierarchy = build_hierarchy(boxes)
+    return blocker_tree(Blockers(boxes, axis, hierarchy), device), device_shields(regions, patches, device)
+
+
+def seen_objects(model: Occlusion, block: np.ndarray, aim_rounds: tuple[int, ...] = AIM_ROUNDS) -> ObjectRows:
+    """Every object that is not proved hidden from some view cells.
+
+    Args:
+        model: occluders and occludees.
+        block: view cells, shape (n,), int.
+        aim_rounds: sightlines shot at what could not be hidden.
+
+    Returns:
+        Reached pairs. A pair that is left out is hidden from every point of the cell outside solids, exactly. A `seen`
+        pair's witness ends on the object, starts outside every solid, and clears all opaque triangles but the object's.
+    """
+    source, target = descend(model, block)
+    count = len(source)
+    rows = ObjectRows(source, target, np.zeros(count, bool), np.zeros((count, 3)), np.zeros((count, 3)))
+    bounds = model.occludees.bounds[target]
+    middles = np.stack([model.cells[source].mean(axis=1), bounds.mean(axis=1)], axis=1)
+    _aim(model, rows, np.arange(count), bounds, middles, target, FIRST_TRIES, 0)
+    return refine_objects(model, rows, aim_rounds)
+
+
+def refine_objects(model: Occlusion, rows: ObjectRows, aim_rounds: tuple[int, ...] = AIM_ROUNDS) -> ObjectRows:
+    """Hide, or find witnesses of, pairs that have neither; seen pairs stay as they are. As `seen_objects`."""
+    pairs, pieces, hints = _prove_pieces(model, rows)
+    potential = rows.seen.copy()
+    potential[pairs] = True
+    for number, tries in enumerate(aim_rounds):
+        todo = np.flatnonzero(~rows.seen[pairs])
+        boxes = model.occludees.pieces[pieces[todo]]
+        _aim(model, rows, pairs[todo], boxes, hints[todo], pieces[todo], tries, number + 1)
+    kept = np.flatnonzero(potential)
+    return ObjectRows(rows.source[kept], rows.target[kept], rows.seen[kept], rows.origin[kept], rows.end[kept])
+
+
+def hidden_boxes(model: Occlusion, source: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    """Boxes that no sightline from the view cell of their row reaches, shape (n,), bool; false proves nothing."""
+    hidden = np.zeros(len(source), bool)
+    apart = _apart(model.cells[source], boxes)
+    hidden[apart] = _shaft(model, source[apart], boxes[apart]).verdict == 0
+    return hidden
+
+
+def descend(model: Occlusion, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(view cell, object) pairs that no proof for a box around the object, or around several, hides; ordered."""
+    levels = model.occludees.levels
+    level = min(FIRST_LEVEL, len(levels) - 1)
+    source = np.repeat(block, 2**level)
+    node = np.tile(np.arange(2**level), len(block))
+    while True:
+        boxes = levels[level][node]
+        present = (boxes[:, 0] <= boxes[:, 1]).all(axis=1)
+        source, node, boxes = source[present], node[present], boxes[present]
+        hidden = np.zeros(len(node), bool)
+        apart = _apart(model.cells[source], boxes)
+        hidden[apart] = _search(model, source[apart], boxes[apart], NODE_CAP).verdict == 0
+        source, node = source[~hidden], node[~hidden]
+        if level == len(levels) - 1:
+            break
+        level += 1
+        source, node = np.repeat(source, 2), (2 * node[:, None] + [0, 1]).ravel()
+    target = model.occludees.objects[node].astype(np.int64)
+    order = np.lexsort((target, source))
+    return source[order].astype(np.int64), target[order]
+
+
+def _apart(cells: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    """Rows whose open cell does not meet the closed box."""
+    meet = (cells[:, 0] < boxes[:, 1]) & (cells[:, 1] > boxes[:, 0])
+    # A flat box inside the cell has low == high, which lies strictly between the cell's sides.
+    return np.flatnonzero(~(meet[:, 0] & meet[:, 1] & meet[:, 2]))
+
+
+def _search(model: Occlusion, source: np.ndarray, boxes: np.ndarray, cap: int) -> TargetAnswers:
+    """Target search from view cells to boxes, row by row."""
+    rows = np.column_stack([source, len(model.cells) + np.arange(len(boxes)), np.ones(len(boxes), int)])
+    everything = np.concatenate([model.cells, boxes])
+    return launch_target_search(model.tree, everything, rows, cap=cap, threads=model.threads, device=model.device)
+
+
+def _shaft(model: Occlusion, source: np.ndarray, boxes: np.ndarray) -> ShaftAnswers:
+    """Shaft test from view cells to boxes, row by row."""
+    rows = np.column_stack([source, len(model.cells) + np.arange(len(boxes))])
+    everything = np.concatenate([model.cells, boxes])
+    options = {"threads": model.threads, "device": model.device}
+    return launch_shaft(model.shields, everything, rows, smallest=model.smallest, cap=model.cap, **options)
+
+
+def _prove_pieces(model: Occlusion, rows: ObjectRows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Try to hide the pieces of the pairs that are not seen, a few at a time, until some of a pair are not hidden.
+
+    Returns:
+        Of every piece that could not be hidden: its pair, its row among the pieces, and a line to it, shape (n, 2, 3).
+    """
+    starts = model.occludees.starts
+    pairs = np.flatnonzero(~rows.seen)
+    first, last = starts[rows.target[pairs]], starts[rows.target[pairs] + 1]
+    open_pieces = np.zeros(len(pairs), int)
+    found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    step = 1
+    while True:
+        active = np.flatnonzero((first < last) & (open_pieces < OPEN_ENOUGH))
+        if not len(active):
+            break
+        sizes = np.minimum(step, last[active] - first[active])
+        at = np.repeat(active, sizes)
+        ends = np.cumsum(sizes)
+        piece = first[at] + np.arange(len(at)) - np.repeat(ends - sizes, sizes)
+        left, hints = _prove_boxes(model, rows.source[pairs[at]], model.occludees.pieces[piece])
+        found.append((pairs[at[left]], piece[left], hints[left]))
+        np.add.at(open_pieces, at[left], 1)
+        first[active] += sizes
+        step *= 2
+    if not found:
+        return np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2, 3))
+    return tuple(np.concatenate(column) for column in zip(*found, strict=True))
+
+
+def _prove_boxes(model: Occlusion, source: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which boxes could not be hidden from the view cell of their row, bool, and a line to each, shape (n, 2, 3)."""
+    hints = np.stack([model.cells[source].mean(axis=1), boxes.mean(axis=1)], axis=1)
+    left = np.ones(len(source), bool)
+    apart = _apart(model.cells[source], boxes)
+    answers = _search(model, source[apart], boxes[apart], PIECE_CAP)
+    left[apart[answers.verdict == 0]] = False
+    lined = np.flatnonzero(answers.verdict == 1)
+    at = apart[lined]
+    hints[at] = np.stack(segments(answers, lined, model.cells[source[at]], boxes[at]), axis=1)
+    # A line past all rectangles that meets no oblique occluder either: there is nothing to prove.
+    at = apart[answers.verdict != 0]
+    options = {"threads": model.threads, "device": model.device}
+    at = at[launch_meets(model.shields, hints[at, 0], hints[at, 1], **options)]
+    proofs = _shaft(model, source[at], boxes[at])
+    left[at[proofs.verdict == 0]] = False
+    failed = proofs.verdict != 0
+    hints[at[failed]] = proofs.middle[failed]
+    return left, hints
+
+
+def _aim(
+    model: Occlusion,
+    rows: ObjectRows,
+    pairs: np.ndarray,
+    boxes: np.ndarray,
+    hints: np.ndarray,
+    streams: np.ndarray,
+    tries: int,
+    number: int,
+) -> None:
+    """Shoot at the objects of the pairs; fills seen, origin and end in place (arguments as in object_visibility)."""
+    if not len(pairs):
+        return
+    source, target = rows.source[pairs], rows.target[pairs]
+    found, origin, end = launch_aim(
+        model.triangles,
+        model.targets,
+        model.cells[source],
+        boxes,
+        hints,
+        target,
+        model.ranges[target],
+        seeds(model.seed + 101 * (number + 1), source, streams),
+        np.full(len(pairs), number > 0),
+        tries=tries,
+        boxed=number > 0,
+        threads=model.threads,
+        device=model.device,
+    )
+    good = np.flatnonzero(found)
+    for cell in np.unique(source[good]):
+        own = good[source[good] == cell]
+        own = own[model.solids.outside(origin[own], int(cell))]
+        rows.seen[pairs[own]] = True
+        rows.origin[pairs[own]], rows.end[pairs[own]] = origin[own], end[own]
