@@ -160,7 +160,7 @@ def launch_occludees(maps: CubeMaps, boxes: np.ndarray, rows: np.ndarray, *, thr
         InputError: a shape, or a row that names no box or no map.
     """
     boxes, rows = np.asarray(boxes), np.ascontiguousarray(rows, np.int32)
-    if boxes.ndim != 3 or boxes.shape[1:] != (2, 3) or rows.ndim != 2 or rows.shape[1] != 2:
+    if boxes.shape[1:] != (2, 3) or rows.ndim != 2 or rows.shape[1] != 2:
         raise InputError(f"boxes, rows: expected shapes (n, 2, 3) and (m, 2), found {boxes.shape} and {rows.shape}")
     limits = (len(boxes), len(maps.arrays.viewpoints))
     if len(rows) and ((rows < 0).any() or (rows.max(axis=0) >= limits).any()):

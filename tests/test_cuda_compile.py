@@ -3,7 +3,7 @@ import importlib
 import pytest
 import warp as wp
 
-MODULES = ("flood", "target", "sightline", "walk", "stab_batch", "coverage", "occludee")
+MODULES = ("flood", "target", "sightline", "walk", "stab_batch", "coverage", "occludee", "backface")
 HOPPER = 90
 
 

@@ -17,6 +17,7 @@ TWINS = {
     "launch_aim": ("sightline", "sightline.Sightlines", "test_sightline_kernels.py"),
     "launch_walk": ("walk", "walk.portal_path", "test_walk.py"),
     "launch_coverage": ("coverage", "coverage_exact.cover_polygon", "test_coverage.py"),
+    "launch_backface": ("backface", "backface_exact.back_facing", "test_backface.py"),
     "launch_occludees": ("occludee", "coverage_exact.covers_box", "test_coverage.py"),
 }
 
