@@ -196,10 +196,12 @@ def write_bake(
     cell_rows: VisibleRows | None,
     object_rows: VisibleRows,
     grid_m: float,
+    more: dict[str, pa.Table] | None = None,
 ) -> Bake:
     """Write a bake folder atomically: a temporary folder beside the target, then a rename.
 
-    The manifest is asked for when the tables are written, so that it can tell how long that took.
+    The manifest is asked for when the tables are written, so that it can tell how long that took. `more` are tables
+    beyond the format's own, by name.
 
     Raises:
         InputError: the disk is full or the place is not writable; what was there before is untouched.
@@ -214,6 +216,7 @@ def write_bake(
     }
     if cell_rows is not None:
         tables["cell_to_cell"] = _cell_to_cell_table(cell_rows, grid_m)
+    tables |= more or {}
 
     with new_folder(folder, kind="bake") as temporary:
         for name, table in tables.items():

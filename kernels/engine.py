@@ -13,15 +13,15 @@ from ..data.graph import CellGraph
 from ..data.incidence import populate
 from ..data.occludees import find_occludees
 from ..data.opaque import OpaquePlanes, opaque_planes
-from ..data.patches import find_patches
-from ..data.regions import find_regions
+from ..data.patches import Patches, find_patches
+from ..data.regions import Regions, find_regions
 from ..data.scene import Role, Scene
 from ..data.solids import SolidIndex, closed_elements
 from . import cell_visibility, flood, object_visibility, occlusion, shaft, sightline, target, walk
 from .cell_visibility import CellRows, Model, cell_rows, join_rows, portal_rows, search_rounds, segments
 from .flood import launch_flood
 from .object_visibility import ObjectModel, ObjectRows, object_rows
-from .occlusion import Occlusion, device_occluders, hidden_boxes, refine_objects, seen_objects
+from .occlusion import Ledger, Occlusion, Proofs, device_occluders, hidden_boxes, refine_objects, seen_objects
 from .sightline import AimTargets, Triangles, aim_targets, device_triangles
 from .target import TargetAnswers
 
@@ -32,8 +32,10 @@ BLOCKING_DETAIL_M2 = 0.1
 # Oblique surfaces below this hide little.
 PATCH_M2 = 0.1
 # View cells and pieces are not halved below this, and a proof has at most so many pieces.
-SMALLEST_M = (0.25, 0.25)
+SMALLEST_M = (0.0625, 0.0625)
 SHAFT_CAP = 2000
+# With certificates, which every halving makes longer.
+CERTIFIED_M = (0.25, 0.25)
 # With "auto" the occluders are asked about cells of whose potential objects more than this share is unknown.
 AUTO_UNKNOWN = 0.02
 NO_PLANES = OpaquePlanes([np.zeros((0, 2, 3), np.int32)] * 3, 0.0, 0.0)
@@ -45,6 +47,7 @@ class Part:
 
     cells: CellRows | None
     objects: ObjectRows
+    proofs: Proofs | None = None
 
     @property
     def unknown_count(self) -> int:
@@ -83,8 +86,8 @@ class Sights:
         device: str,
         blockers: Blockers | None = None,
         shadows: bool = True,
-    ) -> Occlusion:
-        """The occluders and occludees of the model.
+    ) -> tuple[Occlusion, tuple[Regions, Patches]]:
+        """The occluders and occludees of the model, and its occluders as they are on the host.
 
         Args:
             scene: the model.
@@ -100,7 +103,7 @@ class Sights:
         patches = find_patches(corners[solid], owners[solid], least_area=PATCH_M2 / scene.grid_m**2)
         regions = find_regions(scene, self.opaque if shadows else NO_PLANES, sections=shadows)
         tree, shields = device_occluders(regions, patches, blockers, device)
-        return Occlusion(
+        model = Occlusion(
             find_occludees(scene),
             tree,
             shields,
@@ -115,6 +118,7 @@ class Sights:
             threads,
             device,
         )
+        return model, (regions, patches)
 
 
 class Engine:
@@ -162,7 +166,7 @@ class Engine:
     def occlusion(self) -> Occlusion:
         """Occluders of the model, made when they are first asked."""
         model = self.model
-        return self._sights.occlusion(self._scene, model.graph.cells, model.seed, model.threads, model.device)
+        return self._sights.occlusion(self._scene, model.graph.cells, model.seed, model.threads, model.device)[0]
 
     def compile(self) -> None:
         """Load the kernels, so that their compilation is not counted as visibility."""
@@ -196,7 +200,7 @@ class Engine:
         """Cells of whose potential objects so many are unknown that the occluders are asked, shape (cells,), bool."""
         count = self.model.graph.cell_count
         unknown = np.bincount(rows.source[~rows.seen], minlength=count)
-        return unknown > self._least_unknown * np.bincount(rows.source, minlength=count)
+        return unknown > np.minimum(self._least_unknown, 1.0) * np.bincount(rows.source, minlength=count)
 
     def _hide_cells(self, rows: CellRows) -> CellRows:
         """Rows without the unknown cells that occluders hide."""
@@ -213,7 +217,7 @@ class Engine:
         def part(chosen: np.ndarray) -> list[np.ndarray]:
             return [column[chosen] for column in (rows.source, rows.target, rows.seen, rows.origin, rows.end)]
 
-        better = refine_objects(self.occlusion, ObjectRows(*part(doubtful)), occlusion.AIM_ROUNDS if aim else ())
+        better, _ = refine_objects(self.occlusion, ObjectRows(*part(doubtful)), occlusion.AIM_ROUNDS if aim else ())
         found = (better.source, better.target, better.seen, better.origin, better.end)
         joined = [np.concatenate(pair) for pair in zip(part(~doubtful), found, strict=True)]
         order = np.lexsort((joined[1], joined[0]))
@@ -299,6 +303,7 @@ class ViewCellEngine:
         device: str,
         method: str = "occluders",
         portal_graph: CellGraph | None = None,
+        certify: bool = False,
     ) -> None:
         """Copy what visibility needs to the device; arguments as of `Engine`, the graph without portals.
 
@@ -311,12 +316,16 @@ class ViewCellEngine:
             device: Warp device.
             method: "occluders"; "portals", "both" to hide what no line between live cells of `portal_graph` reaches.
             portal_graph: cells and portals of the model.
+            certify: call hidden only what has a certificate, and keep it.
         """
+        self._certify = certify
         self.object_count = len(scene.objects)
         self._solids = closed_elements(scene)
         sights = Sights(scene, opaque, graph.cells, device)
         blockers = None if portal_graph is None else find_blockers(portal_graph, sights.opaque)
-        self.model = sights.occlusion(scene, graph.cells, seed, threads, device, blockers, method != "portals")
+        self.model, self.occluders = sights.occlusion(
+            scene, graph.cells, seed, threads, device, blockers, method != "portals"
+        )
 
     def with_cells(self, cells: np.ndarray) -> "ViewCellEngine":
         """The same engine for other view cells [grid steps], shape (n, 2, 3), int32."""
@@ -331,7 +340,9 @@ class ViewCellEngine:
 
     def visible(self, block: np.ndarray, *, aim: bool = True) -> Part:
         """Rows of some view cells; without `aim` the same pairs are hidden and fewer of the others are seen."""
-        return Part(None, seen_objects(self.model, block, occlusion.AIM_ROUNDS if aim else ()))
+        ledger = Ledger() if self._certify else None
+        rows, proofs = seen_objects(self.model, block, occlusion.AIM_ROUNDS if aim else (), ledger)
+        return Part(None, rows, proofs)
 
     def unknown(self, block: np.ndarray) -> Part:
         """Rows that claim nothing: every object stays potential."""
@@ -350,11 +361,27 @@ def unknown_objects(block: np.ndarray, count: int) -> ObjectRows:
 
 
 def relabelled(part: Part, places: np.ndarray) -> Part:
-    """Object rows with cell c called places[c], and without those of cells whose place is -1."""
-    rows = part.objects
+    """Object rows and proofs with cell c called places[c], and without those of cells whose place is -1."""
+    rows, proofs = part.objects, part.proofs
     kept = np.flatnonzero(places[rows.source] >= 0)
     columns = [column[kept] for column in (rows.target, rows.seen, rows.origin, rows.end)]
-    return Part(None, ObjectRows(places[rows.source[kept]], *columns))
+    if proofs is not None:
+        wanted = places[proofs.cell] >= 0
+        sizes = np.diff(proofs.starts)
+        starts = np.concatenate([[0], np.cumsum(sizes[wanted])])
+        leaves = proofs.leaves[np.repeat(wanted, sizes)]
+        proofs = Proofs(places[proofs.cell[wanted]], proofs.boxes[wanted], starts, leaves)
+    return Part(None, ObjectRows(places[rows.source[kept]], *columns), proofs)
+
+
+def join_proofs(parts: list[Part]) -> Proofs | None:
+    """Proofs of all blocks; None if none were kept."""
+    found = [part.proofs for part in parts if part.proofs is not None]
+    if not found:
+        return None
+    sizes = np.concatenate([np.diff(proofs.starts) for proofs in found])
+    cell, boxes, leaves = (np.concatenate([getattr(p, name) for p in found]) for name in ("cell", "boxes", "leaves"))
+    return Proofs(cell, boxes, np.concatenate([[0], np.cumsum(sizes)]), leaves)
 
 
 def join_objects(parts: list[Part]) -> VisibleRows:

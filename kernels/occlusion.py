@@ -9,6 +9,7 @@ An eye counts only outside every solid, so a view cell may overlap walls and fur
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -33,6 +34,45 @@ FIRST_LEVEL = 3
 NODE_CAP, PIECE_CAP = 40, 2000
 # An object with so many pieces that could not be hidden is not looked at further: they are enough to aim at.
 OPEN_ENOUGH = 3
+
+
+@dataclass
+class Proofs:
+    """Certificates of what is hidden.
+
+    Attributes:
+        cell: view cell of each proof, shape (n,), int64.
+        boxes: what is hidden from it, whatever lies inside [grid steps], shape (n, 2, 3), int32.
+        starts: leaves of proof i are leaves[starts[i]:starts[i + 1]], shape (n + 1,), int64.
+        leaves: as ShaftAnswers.certificate, shape (leaves, 13), int32.
+    """
+
+    cell: np.ndarray
+    boxes: np.ndarray
+    starts: np.ndarray
+    leaves: np.ndarray
+
+
+class Ledger:
+    """Collects proofs; with one, only what has a certificate is called hidden."""
+
+    def __init__(self) -> None:
+        self._entries: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
+
+    def add(self, pair: np.ndarray, cell: np.ndarray, boxes: np.ndarray, answers: ShaftAnswers) -> None:
+        """Enter the proofs of a run; `pair` is what each box is a piece of, -1 if it is whole."""
+        hidden = np.flatnonzero(answers.verdict == 0)
+        sizes = answers.leaves[hidden]
+        self._entries.append((pair[hidden], cell[hidden], boxes[hidden], sizes, answers.certificate))
+
+    def close(self, hidden: np.ndarray) -> Proofs:
+        """All proofs, without those of pieces of pairs that are not hidden; `hidden` is by pair, bool."""
+        none = np.zeros(0, int)
+        entries = [*self._entries, (none, none, np.zeros((0, 2, 3), np.int32), none, np.zeros((0, 13), np.int32))]
+        pair, cell, boxes, sizes, leaves = (np.concatenate(column) for column in zip(*entries, strict=True))
+        wanted = (pair < 0) | np.append(hidden, False)[pair]
+        starts = np.concatenate([[0], np.cumsum(sizes[wanted])])
+        return Proofs(cell[wanted], boxes[wanted], starts, leaves[np.repeat(wanted, sizes)])
 
 
 @dataclass
@@ -78,30 +118,36 @@ def device_occluders(
     return blocker_tree(Blockers(boxes, axis, hierarchy), device), device_shields(regions, patches, device)
 
 
-def seen_objects(model: Occlusion, block: np.ndarray, aim_rounds: tuple[int, ...] = AIM_ROUNDS) -> ObjectRows:
+def seen_objects(
+    model: Occlusion, block: np.ndarray, aim_rounds: tuple[int, ...] = AIM_ROUNDS, ledger: Ledger | None = None
+) -> tuple[ObjectRows, Proofs | None]:
     """Every object that is not proved hidden from some view cells.
 
     Args:
         model: occluders and occludees.
         block: view cells, shape (n,), int.
         aim_rounds: sightlines shot at what could not be hidden.
+        ledger: where to enter certificates; then only what has one is hidden, which is less.
 
     Returns:
         Reached pairs. A pair that is left out is hidden from every point of the cell outside solids, exactly. A `seen`
         pair's witness ends on the object, starts outside every solid, and clears all opaque triangles but the object's.
+        And the certificates, with a ledger.
     """
-    source, target = descend(model, block)
+    source, target = descend(model, block, ledger)
     count = len(source)
     rows = ObjectRows(source, target, np.zeros(count, bool), np.zeros((count, 3)), np.zeros((count, 3)))
     bounds = model.occludees.bounds[target]
     middles = np.stack([model.cells[source].mean(axis=1), bounds.mean(axis=1)], axis=1)
     _aim(model, rows, np.arange(count), bounds, middles, target, FIRST_TRIES, 0)
-    return refine_objects(model, rows, aim_rounds)
+    return refine_objects(model, rows, aim_rounds, ledger)
 
 
-def refine_objects(model: Occlusion, rows: ObjectRows, aim_rounds: tuple[int, ...] = AIM_ROUNDS) -> ObjectRows:
+def refine_objects(
+    model: Occlusion, rows: ObjectRows, aim_rounds: tuple[int, ...] = AIM_ROUNDS, ledger: Ledger | None = None
+) -> tuple[ObjectRows, Proofs | None]:
     """Hide, or find witnesses of, pairs that have neither; seen pairs stay as they are. As `seen_objects`."""
-    pairs, pieces, hints = _prove_pieces(model, rows)
+    pairs, pieces, hints = _prove_pieces(model, rows, ledger)
     potential = rows.seen.copy()
     potential[pairs] = True
     for number, tries in enumerate(aim_rounds):
@@ -109,7 +155,8 @@ def refine_objects(model: Occlusion, rows: ObjectRows, aim_rounds: tuple[int, ..
         boxes = model.occludees.pieces[pieces[todo]]
         _aim(model, rows, pairs[todo], boxes, hints[todo], pieces[todo], tries, number + 1)
     kept = np.flatnonzero(potential)
-    return ObjectRows(rows.source[kept], rows.target[kept], rows.seen[kept], rows.origin[kept], rows.end[kept])
+    proofs = None if ledger is None else ledger.close(~potential)
+    return ObjectRows(rows.source[kept], rows.target[kept], rows.seen[kept], rows.origin[kept], rows.end[kept]), proofs
 
 
 def hidden_boxes(model: Occlusion, source: np.ndarray, boxes: np.ndarray) -> np.ndarray:
@@ -120,7 +167,7 @@ def hidden_boxes(model: Occlusion, source: np.ndarray, boxes: np.ndarray) -> np.
     return hidden
 
 
-def descend(model: Occlusion, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def descend(model: Occlusion, block: np.ndarray, ledger: Ledger | None = None) -> tuple[np.ndarray, np.ndarray]:
     """(view cell, object) pairs that no proof for a box around the object, or around several, hides; ordered."""
     levels = model.occludees.levels
     level = min(FIRST_LEVEL, len(levels) - 1)
@@ -132,7 +179,12 @@ def descend(model: Occlusion, block: np.ndarray) -> tuple[np.ndarray, np.ndarray
         source, node, boxes = source[present], node[present], boxes[present]
         hidden = np.zeros(len(node), bool)
         apart = _apart(model.cells[source], boxes)
-        hidden[apart] = _search(model, source[apart], boxes[apart], NODE_CAP).verdict == 0
+        if ledger is None:
+            hidden[apart] = _search(model, source[apart], boxes[apart], NODE_CAP).verdict == 0
+        else:
+            answers = _shaft(model, source[apart], boxes[apart], cap=NODE_CAP, certify=True)
+            ledger.add(np.full(len(apart), -1), source[apart], boxes[apart], answers)
+            hidden[apart] = answers.verdict == 0
         source, node = source[~hidden], node[~hidden]
         if level == len(levels) - 1:
             break
@@ -157,15 +209,21 @@ def _search(model: Occlusion, source: np.ndarray, boxes: np.ndarray, cap: int) -
     return launch_target_search(model.tree, everything, rows, cap=cap, threads=model.threads, device=model.device)
 
 
-def _shaft(model: Occlusion, source: np.ndarray, boxes: np.ndarray) -> ShaftAnswers:
+def _shaft(
+    model: Occlusion, source: np.ndarray, boxes: np.ndarray, cap: int | None = None, *, certify: bool = False
+) -> ShaftAnswers:
     """Shaft test from view cells to boxes, row by row."""
     rows = np.column_stack([source, len(model.cells) + np.arange(len(boxes))])
     everything = np.concatenate([model.cells, boxes])
     options = {"threads": model.threads, "device": model.device}
-    return launch_shaft(model.shields, everything, rows, smallest=model.smallest, cap=model.cap, **options)
+    return launch_shaft(
+        model.shields, everything, rows, smallest=model.smallest, cap=cap or model.cap, certify=certify, **options
+    )
 
 
-def _prove_pieces(model: Occlusion, rows: ObjectRows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _prove_pieces(
+    model: Occlusion, rows: ObjectRows, ledger: Ledger | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Try to hide the pieces of the pairs that are not seen, a few at a time, until some of a pair are not hidden.
 
     Returns:
@@ -185,7 +243,8 @@ def _prove_pieces(model: Occlusion, rows: ObjectRows) -> tuple[np.ndarray, np.nd
         at = np.repeat(active, sizes)
         ends = np.cumsum(sizes)
         piece = first[at] + np.arange(len(at)) - np.repeat(ends - sizes, sizes)
-        left, hints = _prove_boxes(model, rows.source[pairs[at]], model.occludees.pieces[piece])
+        prove = _prove_boxes if ledger is None else partial(_certify_boxes, ledger=ledger, pair=pairs[at])
+        left, hints = prove(model, rows.source[pairs[at]], model.occludees.pieces[piece])
         found.append((pairs[at[left]], piece[left], hints[left]))
         np.add.at(open_pieces, at[left], 1)
         first[active] += sizes
@@ -213,6 +272,21 @@ def _prove_boxes(model: Occlusion, source: np.ndarray, boxes: np.ndarray) -> tup
     left[at[proofs.verdict == 0]] = False
     failed = proofs.verdict != 0
     hints[at[failed]] = proofs.middle[failed]
+    return left, hints
+
+
+def _certify_boxes(
+    model: Occlusion, source: np.ndarray, boxes: np.ndarray, *, ledger: Ledger, pair: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `_prove_boxes`, with a certificate for what is hidden."""
+    hints = np.stack([model.cells[source].mean(axis=1), boxes.mean(axis=1)], axis=1)
+    left = np.ones(len(source), bool)
+    apart = _apart(model.cells[source], boxes)
+    answers = _shaft(model, source[apart], boxes[apart], certify=True)
+    ledger.add(pair[apart], source[apart], boxes[apart], answers)
+    left[apart[answers.verdict == 0]] = False
+    failed = answers.verdict != 0
+    hints[apart[failed]] = answers.middle[failed]
     return left, hints
 
 

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pyarrow as pa
 from tqdm import tqdm
 
 from .. import __version__
+from ..data.certificates import certificate_tables
 from ..data.database import Bake, VisibleRows, write_bake
 from ..data.errors import InputError
 from ..data.graph import CellGraph
@@ -55,6 +57,7 @@ class Settings:
         depth: times that a cell of the octree may be refined.
         refine_triangles: a cell that may see more triangles is refined.
         refine_gap: a cell is refined if a larger share of what it may see is unknown.
+        certify: store a certificate of everything that is hidden, and call nothing else hidden.
     """
 
     threshold_m2: float = 0.0
@@ -67,6 +70,7 @@ class Settings:
     depth: int = 2
     refine_triangles: int = 100_000
     refine_gap: float = 0.25
+    certify: bool = False
 
 
 @dataclass
@@ -127,7 +131,7 @@ def bake(
     graph, facts = prepared.graph, prepared.facts
     if not graph.inhabitable.any():
         raise InputError(f"{facts['source']}: expected at least one inhabitable cell, found none")
-    cell_rows, object_rows, spent = _visibility(
+    cell_rows, object_rows, certificates, spent = _visibility(
         prepared, settings, out, print_, clock, budget_s, threads, device, progress
     )
     graph = prepared.graph
@@ -136,7 +140,7 @@ def bake(
     def manifest() -> dict:
         return _manifest(facts, settings, print_, graph, cell_rows, object_rows, clock)
 
-    made = write_bake(out, manifest, scene, graph, cell_rows, object_rows, facts["grid_m"])
+    made = write_bake(out, manifest, scene, graph, cell_rows, object_rows, facts["grid_m"], certificates)
     if not spent:
         shutil.rmtree(_partial(out), ignore_errors=True)
     return made
@@ -223,6 +227,8 @@ def _check(settings: Settings, budget_s: float | None, threads: int | None, devi
         raise InputError(f"seal: expected 0 (closing cracks is not built yet), found {settings.seal}")
     if settings.method not in METHODS:
         raise InputError(f"method: expected {', '.join(METHODS)}, found {settings.method!r}")
+    if settings.certify and settings.method != "occluders":
+        raise InputError(f"certify: expected the method occluders, found {settings.method!r}")
     if not 0 <= settings.depth <= DEEPEST:
         raise InputError(f"depth: expected a whole number from 0 to {DEEPEST}, found {settings.depth}")
     import warp as wp
@@ -335,18 +341,19 @@ def _visibility(
     threads: int | None,
     device: str,
     progress: bool,
-) -> tuple[VisibleRows | None, VisibleRows, bool]:
-    """Visibility of all inhabitable cells, block by block, and whether the budget ended it early.
+) -> tuple[VisibleRows | None, VisibleRows, dict[str, pa.Table], bool]:
+    """Visibility of all inhabitable cells, block by block, certificate tables, and whether the budget ended it early.
 
     Finished blocks are kept beside the target. Cells of an octree are refined on the way: `prepared` has them all then.
     """
-    from ..kernels.engine import Engine, ViewCellEngine
+    from ..kernels.engine import Engine, ViewCellEngine, join_proofs
     from ..kernels.launch import thread_count
 
     scene, graph = prepared.scene, prepared.graph
     options = {"seed": settings.seed, "threads": thread_count(threads), "device": device, "method": prepared.method}
     if prepared.view_cells:
-        engine = ViewCellEngine(scene, graph, prepared.opaque, portal_graph=prepared.portal_graph, **options)
+        options |= {"portal_graph": prepared.portal_graph, "certify": settings.certify}
+        engine = ViewCellEngine(scene, graph, prepared.opaque, **options)
     else:
         engine = Engine(scene, graph, prepared.opaque, **options)
     clock.lap("prepare")
@@ -365,7 +372,11 @@ def _visibility(
         parts, spent = _refine(prepared, engine, store, parts, settings, deadline, bar)
     bar.close()
     clock.lap("flood")
-    return *engine.join(parts), spent
+    tables = {}
+    if (proofs := join_proofs(parts)) is not None:
+        columns = (proofs.cell, proofs.boxes, proofs.starts, proofs.leaves)
+        tables = certificate_tables(*columns, *engine.occluders, scene.grid_m)
+    return *engine.join(parts), tables, spent
 
 
 def _refine(

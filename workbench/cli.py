@@ -170,6 +170,9 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
         metavar="SHARE",
         help="refine a cell if more of its set than this is unknown",
     )
+    bake.add_argument(
+        "--certify", action="store_true", help="store a certificate of all that is hidden (method occluders only)"
+    )
     bake.add_argument("--up", choices=["y", "z"], help="axis that points up in a mesh file")
     bake.add_argument("--unit", help="unit of a mesh file, a name or metres; metre by default")
     bake.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")

@@ -53,6 +53,7 @@ def bake(options: argparse.Namespace) -> int:
         depth=options.depth,
         refine_triangles=options.refine_triangles,
         refine_gap=options.refine_gap,
+        certify=options.certify,
     )
     out = Path(options.out) if options.out else default_out(model)
     before = _stamp(out)
