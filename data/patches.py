@@ -185,8 +185,8 @@ def _collect(
         points = triangles[members].reshape(-1, 3)
         normal = vector / area
         height = points @ normal
-        # Three products and two sums, each rounded once.
-        slack = 4 * np.finfo(np.float64).eps * np.abs(points).sum(axis=1).max()
+        # Three products and two sums, each rounded once; none is if the normal is an axis.
+        slack = 4 * np.finfo(np.float64).eps * np.abs(points).sum(axis=1).max() * (np.count_nonzero(normal) > 1)
         outlines.append(outline)
         boxes.append([points.min(axis=0), points.max(axis=0)])
         normals.append(normal)

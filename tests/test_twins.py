@@ -18,6 +18,9 @@ TWINS = {
     "launch_walk": ("walk", "walk.portal_path", "test_walk.py"),
     "launch_coverage": ("coverage", "coverage_exact.cover_polygon", "test_coverage.py"),
     "launch_backface": ("backface", "backface_exact.back_facing", "test_backface.py"),
+    "launch_umbra": ("shadow", "shadow_exact.umbra", "test_shadow.py"),
+    "launch_shrink": ("shadow", "shadow_exact.shrunk", "test_shadow.py"),
+    "launch_grow_hole": ("shadow", "shadow_exact.grown_hole", "test_shadow.py"),
     "launch_occludees": ("occludee", "coverage_exact.covers_box", "test_coverage.py"),
 }
 
