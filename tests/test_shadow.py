@@ -32,6 +32,7 @@ from viewcell.verify.shadow_exact import (
     recession,
     shrunk,
     umbra,
+    winds,
 )
 
 PATCHES = runpy.run_path(str(Path(__file__).with_name("test_patches.py")))
@@ -212,6 +213,47 @@ def test_no_eye_in_the_cell_sees_into_the_umbra_many():
     assert check_eyes(4, 6000) > 10_000
 
 
+def bent_quadrilateral(height):
+    triangles = PATCHES["surface"](1, 1, lambda u, v: (u * 100, v * 100, height * u * v))
+    return find_patches(triangles, np.zeros(2), least_area=1.0, cos_limit=0.2, axial=True)
+
+
+def test_the_umbra_of_a_bent_outline_is_where_it_winds_round_every_line():
+    rng, bent, held = np.random.default_rng(11), bent_quadrilateral(60), np.zeros(2, int)
+    for side in (-1, 1):
+        middle = bent.boxes[0].mean(axis=0) + side * bent.normal[0] * 90
+        cell = np.stack([np.round(middle).astype(int) - 12, np.round(middle).astype(int) + 12])
+        umbras = launch_umbra(cell[None], bent, [[0, 0]])
+        assert umbras.status[0] == USABLE
+        away = umbras.normal[0]
+        points = rng.normal(size=(600, 3)) * rng.choice([30, 300, 3000], (600, 1))
+        points += away * (umbras.far[0] + 0.01 + rng.exponential(50, (600, 1)) - points @ away[:, None])
+        outline = bent.corners.tolist()
+        for point, inside in zip(points, umbras.contains(0, points), strict=True):
+            truth = winds(cell.tolist(), outline, rational([point])[0])
+            assert inside == truth or (truth and not umbras.contains(0, point[None] + away * 1e-3)[0])
+            held[int(inside)] += 1
+    assert held.min() > 100
+
+
+def test_a_touching_cell_has_an_umbra_only_where_the_outline_covers_the_contact():
+    rng, seen = np.random.default_rng(12), set()
+    for _ in range(150):
+        axis, side = rng.integers(0, 3), rng.integers(0, 2)
+        cell = np.stack([low := rng.integers(-9, 9, 3), low + rng.integers(1, 6, 3)])
+        uv = [i for i in range(3) if i != axis]
+        outline = np.full((4, 3), cell[side, axis])
+        ends = np.stack([cell[0] - rng.integers(-3, 4, 3), cell[1] + rng.integers(-1, 4, 3)])
+        if (ends[0] >= ends[1]).any():
+            continue
+        outline[:, uv] = [(ends[i, uv[0]], ends[j, uv[1]]) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        exact = occluder(cell.tolist(), outline.tolist())
+        status = launch_umbra(cell[None], outline_table([outline]), [[0, 0]]).status[0]
+        assert status == (TOUCHES if exact.planes is None else USABLE)
+        seen.add(int(status))
+    assert seen == {TOUCHES, USABLE}
+
+
 def project(exact, point):
     """The point moved onto the plane of the outline along its normal, exactly."""
     return along(point, -exact.depth(point) / dot(exact.normal, exact.normal), exact.normal)
@@ -325,10 +367,16 @@ def test_a_grown_axial_hole_is_the_hull_of_its_corners():
     np.testing.assert_allclose(polygons.corners.max(axis=0), points.max(axis=0), atol=1e-3)
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_hole_seen_from_far_away_hardly_grows(side):
+    hole = np.array([[30, 0, 300], [30, 9000, 1300], [30, 4000, 7800]])
+    low = np.array([30 + side * 90_000, 40, 40])
+    _, polygons = launch_grow_hole([[low, low + 1]], outline_table([hole]), [[0, 0]], [low + 0.5])
+    assert area_of(hole) < area_of(polygons.corners) < 1.001 * area_of(hole)
+
+
 def test_bent_outlines_and_points_behind_leave_nothing():
-    triangles = PATCHES["surface"](1, 1, lambda u, v: (u * 100, v * 100, 60 * u * v))
-    bent = find_patches(triangles, np.zeros(2), least_area=1.0, cos_limit=0.2, axial=True)
-    assert len(bent.area) == 1
+    bent = bent_quadrilateral(60)
     cut, before = [[40, 40, 0], [60, 60, 20]], [[0, 0, -99], [9, 9, -90]]
     round_an_edge = [[95, -105, -65], [105, -95, -55]]
     umbras = launch_umbra([cut, round_an_edge, before], bent, [[0, 0], [1, 0], [2, 0]])

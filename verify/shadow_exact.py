@@ -154,6 +154,14 @@ def hides(o: Occluder, x: Vector) -> bool:
     return True
 
 
+def winds(cell: Sequence[Vector], outline: Sequence[Vector], x: Vector) -> bool:
+    """Whether every line from a cell's corner to x has every edge of the outline, flat or bent, on the same side."""
+    points, corners = box_corners(cell), rational(outline)
+    pairs = list(zip(corners, corners[1:] + corners[:1], strict=True))
+    sides = [dot(minus(x, p), cross(minus(a, p), minus(b, p))) for p in points for a, b in pairs]
+    return min(sides) >= 0 or max(sides) <= 0
+
+
 def clip(polygon: list[list[Fraction]], m: Vector, c: Fraction) -> list[list[Fraction]]:
     """The part of a convex polygon with m . q >= c."""
     out = []
