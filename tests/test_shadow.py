@@ -218,22 +218,32 @@ def bent_quadrilateral(height):
     return find_patches(triangles, np.zeros(2), least_area=1.0, cos_limit=0.2, axial=True)
 
 
-def test_the_umbra_of_a_bent_outline_is_where_it_winds_round_every_line():
-    rng, bent, held = np.random.default_rng(11), bent_quadrilateral(60), np.zeros(2, int)
+def bent_scenes():
+    """Bent outlines and cells; in the last the separating planes bind."""
+    bent = bent_quadrilateral(60)
     for side in (-1, 1):
-        middle = bent.boxes[0].mean(axis=0) + side * bent.normal[0] * 90
-        cell = np.stack([np.round(middle).astype(int) - 12, np.round(middle).astype(int) + 12])
-        umbras = launch_umbra(cell[None], bent, [[0, 0]])
-        assert umbras.status[0] == USABLE
-        away = umbras.normal[0]
-        points = rng.normal(size=(600, 3)) * rng.choice([30, 300, 3000], (600, 1))
-        points += away * (umbras.far[0] + 0.01 + rng.exponential(50, (600, 1)) - points @ away[:, None])
-        outline = bent.corners.tolist()
-        for point, inside in zip(points, umbras.contains(0, points), strict=True):
-            truth = winds(cell.tolist(), outline, rational([point])[0])
-            assert inside == truth or (truth and not umbras.contains(0, point[None] + away * 1e-3)[0])
-            held[int(inside)] += 1
-    assert held.min() > 100
+        middle = np.round(bent.boxes[0].mean(axis=0) + side * bent.normal[0] * 90).astype(int)
+        yield bent, np.stack([middle - 12, middle + 12])
+    a, b, c, d = [[-38, 86, 35], [97, 23, -74], [30, 39, 60], [-78, 63, 72]]
+    steep = find_patches(np.array([[a, b, c], [a, c, d]]), np.zeros(2), least_area=1.0, cos_limit=0.05, axial=True)
+    yield steep, np.array([[14, 88, -1], [19, 91, 6]])
+
+
+@pytest.mark.parametrize("scene", range(3))
+def test_the_umbra_of_a_bent_outline_is_where_it_winds_round_every_line(scene):
+    rng, held = np.random.default_rng(11), np.zeros(2, int)
+    bent, cell = list(bent_scenes())[scene]
+    assert np.diff(bent.starts).tolist() == [4]
+    umbras = launch_umbra(cell[None], bent, [[0, 0]])
+    assert umbras.status[0] == USABLE
+    away = umbras.normal[0]
+    points = rng.normal(size=(800, 3)) * rng.choice([30, 300, 3000], (800, 1))
+    points += away * (umbras.far[0] + 0.01 + rng.exponential(30, (800, 1)) - points @ away[:, None])
+    for point, inside in zip(points, umbras.contains(0, points), strict=True):
+        truth = winds(cell.tolist(), bent.corners.tolist(), rational([point])[0])
+        assert inside == truth or (truth and not umbras.contains(0, point[None] + away * 1e-3)[0])
+        held[int(inside)] += 1
+    assert held.min() > 30
 
 
 def test_a_touching_cell_has_an_umbra_only_where_the_outline_covers_the_contact():
