@@ -22,6 +22,8 @@ from .solids import closed_elements, dead_cells
 # An eye is at most this far above the floor that it walks on.
 EYE_M = 2.0
 CELLS_MOST = 1_000_000
+# View cells may stand this far outside the model's box: in the street before a house.
+AROUND_M = 10.0
 
 
 def as_graph(cells: np.ndarray, names: np.ndarray | None = None, inhabitable: np.ndarray | None = None) -> CellGraph:
@@ -48,7 +50,7 @@ def read_view_cells(path: str | Path, scene: Scene) -> CellGraph:
         A graph without portals. Boxes are snapped outwards, so that every eye in the given box is in the cell.
 
     Raises:
-        InputError: the table is unreadable, a box has no volume, or one lies wholly outside the model.
+        InputError: the table is unreadable, a box has no volume, or one lies more than AROUND_M outside the model.
     """
     path = Path(path)
     if path.suffix.lower() == ".csv":
@@ -74,10 +76,12 @@ def read_view_cells(path: str | Path, scene: Scene) -> CellGraph:
     flat = np.flatnonzero((boxes[:, 1] <= boxes[:, 0]).any(axis=1))
     if len(flat):
         raise InputError(f"{path}: expected view cells with min below max, found cell {flat[0]} without volume")
-    low, high = model_bounds(scene)
+    low, high = model_bounds(scene) + np.array([[-1], [1]]) * round(AROUND_M / scene.grid_m)
     away = np.flatnonzero((cells[:, 0] >= high).any(axis=1) | (cells[:, 1] <= low).any(axis=1))
     if len(away):
-        raise InputError(f"{path}: expected view cells that meet the model's box, found cell {away[0]} outside it")
+        raise InputError(
+            f"{path}: expected view cells within {AROUND_M:g} m of the model, found cell {away[0]} outside"
+        )
     return as_graph(cells, names, inhabitable.astype(bool))
 
 

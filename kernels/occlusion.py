@@ -21,7 +21,7 @@ from ..data.regions import Regions
 from ..data.solids import SolidIndex
 from .cell_visibility import seeds, segments
 from .object_visibility import ObjectRows
-from .shaft import ShaftAnswers, Shields, device_shields, launch_meets, launch_shaft
+from .shaft import ShaftAnswers, Shields, device_shields, patches_met, launch_shaft
 from .sightline import AimTargets, Triangles, launch_aim
 from .target import BlockerTree, TargetAnswers, blocker_tree, launch_target_search
 
@@ -267,7 +267,7 @@ def _prove_boxes(model: Occlusion, source: np.ndarray, boxes: np.ndarray) -> tup
     # A line past all rectangles that meets no oblique occluder either: there is nothing to prove.
     at = apart[answers.verdict != 0]
     options = {"threads": model.threads, "device": model.device}
-    at = at[launch_meets(model.shields, hints[at, 0], hints[at, 1], **options)]
+    at = at[patches_met(model.shields, hints[at, 0], hints[at, 1], **options)]
     proofs = _shaft(model, source[at], boxes[at])
     left[at[proofs.verdict == 0]] = False
     failed = proofs.verdict != 0

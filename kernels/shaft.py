@@ -494,7 +494,7 @@ def _meets(
         row += slots
 
 
-def launch_meets(
+def patches_met(
     shields: Shields, origins: np.ndarray, ends: np.ndarray, *, threads: int = 1, device: str = "cpu"
 ) -> np.ndarray:
     """Whether each segment may meet an oblique occluder: where it does not, no shaft around it can be blocked by one.

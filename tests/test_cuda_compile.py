@@ -3,7 +3,7 @@ import importlib
 import pytest
 import warp as wp
 
-MODULES = ("flood", "target", "sightline", "walk", "stab_batch", "coverage", "occludee", "backface", "shadow")
+MODULES = ("flood", "target", "sightline", "walk", "shaft", "stab_batch", "coverage", "occludee", "backface", "shadow")
 HOPPER = 90
 
 

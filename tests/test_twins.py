@@ -16,6 +16,7 @@ TWINS = {
     "launch_confirm": ("sightline", "sightline.Sightlines", "test_sightline_kernels.py"),
     "launch_aim": ("sightline", "sightline.Sightlines", "test_sightline_kernels.py"),
     "launch_walk": ("walk", "walk.portal_path", "test_walk.py"),
+    "launch_shaft": ("shaft", "shadow_exact.hides", "test_shaft.py"),
     "launch_coverage": ("coverage", "coverage_exact.cover_polygon", "test_coverage.py"),
     "launch_backface": ("backface", "backface_exact.back_facing", "test_backface.py"),
     "launch_umbra": ("shadow", "shadow_exact.umbra", "test_shadow.py"),

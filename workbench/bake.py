@@ -180,6 +180,8 @@ def _prepare(scene: Scene | None, graph_folder: Path | None, settings: Settings,
         facts |= {"max_snap_m": snapped, "skipped": [], "counts": {"objects": 0}}
         return _Prepared(None, graph, None, facts, False, "portals")
     facts = scene_manifest(scene)
+    if not closed_elements(scene):
+        facts["warnings"] = ["no closed opaque solid: only surfaces occlude, and every point counts as outside"]
     clock.lap("read")
     cells, method = settings.cells, settings.method
     large = len(scene.triangles()[0]) > PORTAL_TRIANGLES

@@ -23,6 +23,7 @@ def summary(bake: "Bake") -> str:
     if leak:
         shown = ", ".join(str(cell) for cell in leak[:LEAK_SHOWN]) + (", ..." if len(leak) > LEAK_SHOWN else "")
         lines.append(f"the outside leaks into the middle of the building, through cells {shown}")
+    lines += [f"warning: {text}" for text in facts.get("warnings", [])]
     rows = [(c.name, *c.columns()) for c in count_pairs(bake)]
     lines += ["", table(("seen from inhabitable cells", "potential", "seen", "overestimate", "unknown"), rows), ""]
     lines.append("seconds: " + ", ".join(f"{name} {value:.1f}" for name, value in facts["seconds"].items()))
