@@ -1,0 +1,315 @@
+"""Projection points against Clarabel, HiGHS, exact optimality conditions, and the identities behind the programmes."""
+
+import runpy
+import subprocess
+import sys
+from dataclasses import replace
+from fractions import Fraction
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from viewcell.data.errors import InputError
+from viewcell.kernels.shadow import STRADDLES, USABLE, launch_shrink, launch_umbra
+from viewcell.solvers.projection_point import (
+    BOUNDED,
+    MOST_HEIGHT,
+    PULL,
+    Problem,
+    cluster_problems,
+    excluded,
+    in_front,
+    lowest_points,
+    solve_points,
+    unit_areas,
+)
+from viewcell.solvers.referees import cone_point, searched_point, vertex_point
+from viewcell.solvers.result import ADVICE, Status
+from viewcell.verify.shadow_exact import dot, lowest_height
+
+SHADOW = runpy.run_path(str(Path(__file__).with_name("test_shadow.py")))
+outline_table = SHADOW["outline_table"]
+
+
+def rectangle(axis, plane, low_u, high_u, low_v, high_v):
+    corners = np.zeros((4, 3), int)
+    corners[:, axis] = plane
+    corners[:, axis - 2] = low_u, high_u, high_u, low_u
+    corners[:, axis - 1] = low_v, low_v, high_v, high_v
+    return corners
+
+
+def random_umbras(rng, cells, outlines):
+    """Boxes, and all their umbras with outlines of all sizes around them."""
+    low = rng.integers(-3000, 3000, (cells, 3))
+    boxes = np.stack([low, low + rng.integers(40, 700, (cells, 3))], axis=1)
+    shapes = [rng.choice([9, 60]) * SHADOW["random_outline"](rng) for _ in range(outlines)]
+    table = outline_table([rng.integers(-4000, 4000, 3) + shape - shape[0] for shape in shapes])
+    pairs = np.stack(np.meshgrid(np.arange(cells), np.arange(outlines), indexing="ij"), axis=-1).reshape(-1, 2)
+    return boxes, launch_umbra(boxes, table, pairs), pairs
+
+
+def random_problems(seed, cells, outlines, clusters, **options):
+    rng = np.random.default_rng(seed)
+    boxes, umbras, pairs = random_umbras(rng, cells, outlines)
+    cluster = rng.integers(0, clusters, len(pairs))
+    return cluster_problems(umbras, boxes, pairs[:, 0], cluster, clusters, **options)
+
+
+def one_problem(outlines, **options):
+    box = np.array([[[0, 0, 0], [1000, 1000, 1000]]])
+    pairs = np.stack([np.zeros(len(outlines), int), np.arange(len(outlines))], axis=1)
+    umbras = launch_umbra(box, outline_table(outlines), pairs)
+    return umbras, cluster_problems(umbras, box, pairs[:, 0], pairs[:, 0], 1, **options)[0]
+
+
+def test_lowest_points_are_those_of_the_exact_programme():
+    rng, bounded = np.random.default_rng(1), 0
+    for _ in range(60):
+        cell, outline, exact = SHADOW["random_scene"](rng)
+        umbras = launch_umbra(cell[None], outline_table([outline]), [[0, 0]])
+        lowest = lowest_points(umbras)[0]
+        wanted = lowest_height(exact) if umbras.status[0] == USABLE else None
+        assert np.isinf(lowest) == (wanted is None)
+        if wanted is not None:
+            unit = float(dot(exact.normal, exact.normal)) ** 0.5
+            assert lowest - umbras.far[0] == pytest.approx(float(wanted) / unit, rel=1e-4, abs=1e-3)
+        bounded += wanted is not None
+    assert 10 < bounded < 50
+
+
+def test_the_shrunk_area_grows_with_the_square_of_the_height_inside_the_half_spaces():
+    rng = np.random.default_rng(2)
+    boxes, umbras, pairs = random_umbras(rng, 10, 40)
+    low, size = boxes[pairs[:, 0], 0], np.ptp(boxes, axis=1)[pairs[:, 0]]
+    points = [low + rng.random((len(pairs), 3)) * size for _ in range(2)]
+    areas = [unit_areas(umbras, p) for p in points]
+    large = (np.minimum(*areas) > 1e-3) & (umbras.status == USABLE)
+    assert large.sum() > 20
+    np.testing.assert_allclose(areas[0][large], areas[1][large], rtol=1e-2)
+    polygons = launch_shrink(umbras, np.arange(len(pairs)), points[0])
+    row = int(np.flatnonzero(large)[0])
+    height = umbras.far[row] - umbras.normal[row] @ points[0][row]
+    corners = polygons.corners[polygons.starts[row] : polygons.starts[row + 1]]
+    assert areas[0][row] * height**2 == pytest.approx(SHADOW["area_of"](corners))
+
+
+def check_against_referee(problems, referee):
+    """Compare optima to 1e-6 of the optimum or 1e-9 of what the programme measures in all, whichever is more."""
+    result, compared = solve_points(problems), 0
+    for i, problem in enumerate(problems):
+        if len(problem.normals) == 0:
+            assert result.status[i] == Status.EMPTY
+            continue
+        other = referee(problem)
+        assert result.status[i] == other.status[0] == Status.SOLVED
+        size = problem.weights.sum() * problem.scale**2 if problem.quadratic else 0.0
+        scale = abs(other.objective[0]) + 1e-3 * (abs(problem.objective(problem.centre)) + size)
+        assert result.objective[i] == pytest.approx(other.objective[0], abs=1e-6 * scale)
+        assert (problem.rows @ result.point[i] >= problem.bounds - 1e-6 * problem.scale).all()
+        compared += 1
+    return compared
+
+
+def test_cone_programmes_agree_with_clarabel():
+    assert check_against_referee(random_problems(3, 26, 30, 14), cone_point) >= 200
+
+
+def test_linear_programmes_agree_with_highs():
+    problems = random_problems(4, 26, 30, 14, objective="lp", depth=20_000.0)
+    assert check_against_referee(problems, vertex_point) >= 200
+
+
+@pytest.mark.slow
+def test_programmes_agree_with_their_referees_many():
+    assert check_against_referee(random_problems(5, 150, 60, 14), cone_point) >= 1500
+    problems = random_problems(6, 150, 60, 14, objective="lp", depth=20_000.0)
+    assert check_against_referee(problems, vertex_point) >= 1500
+
+
+def eliminate(matrix, right):
+    """Solution of a rational system, None if it is singular."""
+    rows = [[*row, value] for row, value in zip(matrix, right, strict=True)]
+    for i in range(len(rows)):
+        pivot = next((r for r in range(i, len(rows)) if rows[r][i] != 0), None)
+        if pivot is None:
+            return None
+        rows[i], rows[pivot] = rows[pivot], rows[i]
+        rows[i] = [x / rows[i][i] for x in rows[i]]
+        for r in range(len(rows)):
+            if r != i and rows[r][i] != 0:
+                rows[r] = [x - rows[r][i] * y for x, y in zip(rows[r], rows[i], strict=True)]
+    return [row[-1] for row in rows]
+
+
+def exact_optimum(problem):
+    """Minimum of a strictly convex quadratic programme by trying all active sets, in rationals."""
+    normals, rows = ([[Fraction(float(x)) for x in row] for row in table] for table in (problem.normals, problem.rows))
+    targets, bounds = ([Fraction(float(x)) for x in table] for table in (problem.targets, problem.bounds))
+    hessian = [[2 * sum(n[i] * n[j] for n in normals) for j in range(3)] for i in range(3)]
+    linear = [2 * sum(n[i] * t for n, t in zip(normals, targets, strict=True)) for i in range(3)]
+    for size in range(4):
+        for active in combinations(range(len(rows)), size):
+            matrix = [hessian[i] + [-rows[k][i] for k in active] for i in range(3)]
+            matrix += [rows[k] + [Fraction(0)] * size for k in active]
+            answer = eliminate(matrix, linear + [bounds[k] for k in active])
+            if answer is None or any(w < 0 for w in answer[3:]):
+                continue
+            if all(dot(row, answer[:3]) >= bound for row, bound in zip(rows, bounds, strict=True)):
+                return sum((dot(n, answer[:3]) - t) ** 2 for n, t in zip(normals, targets, strict=True)), size
+    raise AssertionError("no optimum")
+
+
+def test_small_cone_programmes_satisfy_the_exact_optimality_conditions():
+    rng, sizes, problems = np.random.default_rng(7), set(), []
+    while len(problems) < 10:
+        plane = rng.choice([-1, 1], 3) * rng.integers(400, 9000, 3)
+        low, high = -rng.integers(0, 4000, (3, 2)), 1000 + rng.integers(0, 4000, (3, 2))
+        plane += np.where(plane > 0, 1000, 0)
+        outlines = [rectangle(k, plane[k], low[k, 0], high[k, 0], low[k, 1], high[k, 1]) for k in range(3)]
+        _, problem = one_problem(outlines)
+        if np.linalg.matrix_rank(problem.normals) == 3:
+            # The lowest points lie on supporting planes; targets near the centre have their optimum inside.
+            moved = problem.normals @ problem.centre - rng.uniform(0, 400 * len(problems), 3)
+            problems.append(replace(problem, targets=moved if len(problems) % 2 else problem.targets))
+    result = solve_points(problems)
+    for i, problem in enumerate(problems):
+        wanted, size = exact_optimum(problem)
+        scale = float(wanted) + 1e-3 * problem.objective(problem.centre)
+        assert result.objective[i] == pytest.approx(float(wanted), abs=1e-6 * scale)
+        sizes.add(size)
+    assert len(sizes) > 1, "optima inside and on the boundary"
+
+
+def test_parallel_occluders_leave_the_point_on_the_axis_they_leave_free():
+    near, far = rectangle(0, 3000, -4000, 5000, -4000, 5000), rectangle(0, 5000, -9000, 9000, -9000, 9000)
+    _, problem = one_problem([near, far])
+    assert np.linalg.matrix_rank(problem.scaled()[0], tol=10 * PULL) == 1
+    result = solve_points([problem])
+    assert result.status[0] == Status.SOLVED
+    assert result.objective[0] == pytest.approx(cone_point(problem).objective[0], rel=1e-6)
+    assert (problem.rows @ result.point[0] >= problem.bounds - 1e-3).all()
+
+
+def test_an_apex_that_can_be_reached_is_the_optimum():
+    _, problem = one_problem([rectangle(0, 3000, -2000, 3000, -2000, 3000)])
+    result = solve_points([problem])
+    # Both pairs of sides have rho 2/3, so the planes meet 5000 / (4/3) before the occluder.
+    assert problem.targets[0] == pytest.approx(-750, abs=1e-3)
+    assert problem.normals[0] @ result.point[0] == pytest.approx(-750, abs=0.1)
+    assert np.abs(problem.rows @ result.point[0] - problem.bounds).min() < 0.1
+
+
+def test_an_occluder_hardly_larger_than_the_cell_asks_for_no_more_than_the_reach():
+    umbras, problem = one_problem([rectangle(0, 3000, -1, 1001, -1, 1001)], reach=2.0)
+    assert excluded(umbras).tolist() == [USABLE]
+    result = solve_points([problem])
+    assert result.status[0] == Status.SOLVED
+    assert problem.targets[0] < -1e6
+    assert result.point[0][0] == pytest.approx(problem.centre[0] - 2.0 * problem.scale, abs=0.1)
+    wider = one_problem([rectangle(0, 3000, 0, 1000, 0, 1001)])[1]
+    assert wider.targets[0] == pytest.approx(3000 - MOST_HEIGHT * wider.scale)
+
+
+def test_occluders_without_infinite_shadow_or_cut_by_the_cell_take_no_part():
+    small, cut = rectangle(0, 3000, 300, 700, 300, 700), rectangle(0, 500, -9, 9, -9, 9)
+    large = rectangle(1, -900, -9000, 9000, -9000, 9000)
+    umbras, problem = one_problem([small, cut, large])
+    assert excluded(umbras).tolist() == [BOUNDED, STRADDLES, USABLE]
+    assert len(problem.normals) == 1
+    _, nothing = one_problem([small, cut])
+    result = solve_points([nothing])
+    assert result.status[0] == Status.EMPTY
+    assert result.point[0].tolist() == [500.0, 500.0, 500.0]
+    assert np.isnan(result.objective[0])
+    assert result.advice(0) == ADVICE[Status.EMPTY]
+
+
+def box_problem(target, far, normal=(1.0, 0.0, 0.0), rows=(), bounds=()):
+    box = np.concatenate([np.eye(3), -np.eye(3)])
+    return Problem(
+        True,
+        np.array([normal]),
+        np.array([target]),
+        np.ones(1),
+        np.array([far]),
+        np.concatenate([np.array(rows).reshape(-1, 3), box]),
+        np.concatenate([np.array(bounds), np.full(6, -100.0)]),
+        np.zeros(3),
+        50.0,
+    )
+
+
+def test_an_optimum_behind_an_occluder_is_rejected_for_the_centre():
+    result = solve_points([box_problem(40.0, 30.0), box_problem(20.0, 30.0)])
+    assert result.status.tolist() == [Status.REJECTED, Status.SOLVED]
+    assert result.point[0].tolist() == [0.0, 0.0, 0.0]
+    assert result.point[1] == pytest.approx([20.0, 0.0, 0.0], abs=1e-4)
+    assert result.objective[0] == pytest.approx(0.0, abs=1e-4)
+    assert cone_point(box_problem(40.0, 30.0)).status[0] == Status.REJECTED
+
+
+def test_rows_that_leave_nothing_are_reported():
+    impossible = box_problem(0.0, 30.0, rows=[[1.0, 0, 0], [-1.0, 0, 0]], bounds=[5.0, 5.0])
+    result = solve_points([impossible, box_problem(20.0, 30.0)])
+    assert result.status.tolist() == [Status.INFEASIBLE, Status.SOLVED]
+    assert in_front(impossible, result.point[0])
+
+
+@pytest.mark.parametrize("exponent", [2, 40])
+def test_the_last_test_before_use_is_exact(exponent):
+    """Beside the limit of 1/64 grid step and the float64 slack, by less than float64 sees in the sum."""
+    limit, step = Fraction(1, 64) + Fraction(1, 2**24), Fraction(1, 2**exponent)
+    normal = (0.6, 0.8, 0.0)
+    point = np.array([3.0, 1.0, 0.0])
+    far = float(sum(Fraction(n) * Fraction(x) for n, x in zip(normal, point.tolist(), strict=True)) + limit)
+    exact = Fraction(far) - sum(Fraction(n) * Fraction(x) for n, x in zip(normal, point.tolist(), strict=True))
+    assert in_front(box_problem(0.0, far, normal), point) == (exact >= limit)
+    assert in_front(box_problem(0.0, far + float(step), normal), point)
+    assert not in_front(box_problem(0.0, far - float(step), normal), point)
+    assert not in_front(box_problem(0.0, np.inf, normal), point * np.nan)
+
+
+def test_batches_and_their_order_change_nothing():
+    problems = random_problems(8, 12, 20, 14)
+    whole, turned = solve_points(problems), solve_points(problems[::-1])
+    np.testing.assert_allclose(whole.point, turned.point[::-1], rtol=0, atol=1e-9)
+    assert whole.status.tolist() == turned.status[::-1].tolist()
+    assert len(solve_points([]).point) == 0
+
+
+def test_search_finds_what_the_programme_finds():
+    _, problem = one_problem([rectangle(axis, 3000, -2000, 3000, -2000, 3000) for axis in (0, 1)])
+    open_box = replace(problem, rows=problem.rows[8:], bounds=problem.bounds[8:])
+    best = solve_points([open_box])
+    found = searched_point(open_box, lambda v: -open_box.objective(v), reach=2.0, starts=3, evaluations=200)
+    assert -found.objective[0] >= best.objective[0] - 1.0
+    assert -found.objective[0] < 1e-3 * open_box.objective(open_box.centre)
+    assert found.iterations[0] <= 601
+    flat = searched_point(open_box, lambda v: 7.0, starts=2, evaluations=20)
+    assert flat.point[0].tolist() == problem.centre.tolist() and flat.objective[0] == 7.0
+
+
+def test_search_stays_in_front_of_the_occluders():
+    _, problem = one_problem([rectangle(0, 1500, -2000, 3000, -2000, 3000)])
+    found = searched_point(problem, lambda v: v[0], reach=3.0, starts=2, evaluations=100)
+    assert in_front(problem, found.point[0])
+    assert found.point[0][0] > 1000
+
+
+def test_nothing_slow_is_imported_before_it_is_needed():
+    code = (
+        "import sys, viewcell, viewcell.solvers.projection_point, viewcell.solvers.referees\n"
+        "from viewcell.workbench.cli import main\n"
+        "try:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "print(sorted({'jax', 'clarabel', 'nlopt'} & set(sys.modules)))"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert out.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("options", [{"objective": "qp"}, {"objective": "lp"}, {"objective": "lp", "depth": -1.0}])
+def test_bad_options(options):
+    with pytest.raises(InputError, match="expected"):
+        one_problem([rectangle(0, 3000, -2000, 3000, -2000, 3000)], **options)
