@@ -1,0 +1,277 @@
+"""What is hidden from view cells, by the occlusion method of vLOD: projection points, shrunk occluders and cube maps.
+
+For each view cell the occluders are put into clusters by direction. Each cluster gets a projection point; from there
+its occluders are shrunk (kernels/shadow.py), so that whatever they hide from the point they hide from all of the cell,
+and drawn into a cube map (kernels/coverage.py) that the occludees are tested against (kernels/occludee.py). Every step
+errs on the side of the visible.
+
+An eye counts only outside every solid where the occluders are sections of solids. Source: Chhugani et al. 2005, section
+5.2. Beyond the paper occluders may be shrunk for occludees within a distance, one cube map for each shell of distances.
+"""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..data.errors import InputError
+from ..data.patches import Patches
+from .coverage import launch_coverage
+from .occludee import launch_occludees
+from .shadow import USABLE, Umbras, launch_shrink, launch_umbra
+
+CLUSTERS = (1, 6, 14, 26)
+OBJECTIVES = ("centre", "random")
+
+
+@dataclass(frozen=True)
+class VlodSettings:
+    """How view cells are treated.
+
+    Attributes:
+        clusters: of occluders by direction: 1, 6 (axes), 14 (and diagonals of the cube), 26 (and those of its faces).
+        objective: how projection points are chosen: "centre" of the cell, or a "random" point of it.
+        resolution: pixels on a cube map face's side.
+        shells: cube maps for occludees within the scene's diameter, half of it, a quarter, ...; 0 for a single map
+            without a limit, as in the paper.
+        split: parts on each axis of a view cell; what is hidden from all parts is hidden from the cell.
+        occluders: used at most for a view cell, those of the largest solid angle about its centre.
+        seed: of random points.
+    """
+
+    clusters: int = 26
+    objective: str = "centre"
+    resolution: int = 512
+    shells: int = 0
+    split: int = 1
+    occluders: int = 2000
+    seed: int = 0
+
+    def __post_init__(self):
+        if self.clusters not in CLUSTERS:
+            raise InputError(f"clusters: expected one of {CLUSTERS}, found {self.clusters}")
+        if self.objective not in OBJECTIVES:
+            raise InputError(f"objective: expected one of {OBJECTIVES}, found {self.objective!r}")
+        if self.shells < 0 or self.split < 1 or self.occluders < 0:
+            found = f"{self.shells}, {self.split}, {self.occluders}"
+            raise InputError(f"shells, split, occluders: expected at least 0, 1 and 0, found {found}")
+
+
+@dataclass
+class VlodStats:
+    """What the method did.
+
+    Attributes:
+        seconds: by phase: umbra, solve, shrink, coverage, occludees.
+        occluders: of all cells, those that an umbra was found for; and `drawn`, polygons left after shrinking.
+        fallbacks: clusters whose solution could not be used, and that took the cell's centre.
+    """
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    occluders: int = 0
+    drawn: int = 0
+    fallbacks: int = 0
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Add the time spent inside to a phase."""
+        start = time.perf_counter()
+        yield
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+
+def rectangle_outlines(boxes: np.ndarray) -> Patches:
+    """Flat axial boxes (data/regions.py) as outlines, shape (n, 2, 3), int32."""
+    count = len(boxes)
+    axis = (boxes[:, 1] == boxes[:, 0]).argmax(axis=1)
+    u, v = ((axis + step) % 3 for step in (1, 2))
+    rows = np.arange(count)
+    corners = np.repeat(boxes[:, :1], 4, axis=1)
+    for corner, (at_u, at_v) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
+        corners[rows, corner, u] = boxes[rows, at_u, u]
+        corners[rows, corner, v] = boxes[rows, at_v, v]
+    normal = np.zeros((count, 3))
+    normal[rows, axis] = 1
+    size = (boxes[:, 1] - boxes[:, 0]).astype(float)
+    return Patches(
+        corners.reshape(-1, 3).astype(np.int32),
+        np.arange(0, 4 * count + 1, 4, dtype=np.int64),
+        boxes.astype(np.int32),
+        normal,
+        np.repeat(boxes[rows, 0, axis].astype(float)[:, None], 2, axis=1),
+        np.full(count, -1, np.int32),
+        size[rows, u] * size[rows, v],
+    )
+
+
+def join_outlines(first: Patches, second: Patches) -> Patches:
+    """Both sets of outlines as one."""
+    names = ("corners", "boxes", "normal", "depth", "owner", "area")
+    joined = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
+    return Patches(starts=np.concatenate([first.starts, first.starts[-1] + second.starts[1:]]), **joined)
+
+
+def cluster_directions(count: int) -> np.ndarray:
+    """Unit directions of so many clusters, shape (count, 3)."""
+    grid = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    steps = np.abs(grid).sum(axis=1)
+    kinds = {1: (), 6: (1,), 14: (1, 3), 26: (1, 2, 3)}[count]
+    chosen = grid[np.isin(steps, kinds)] if kinds else np.array([[0, 0, 1]])
+    return chosen / np.linalg.norm(chosen, axis=1, keepdims=True)
+
+
+def vlod_hidden(
+    cells: np.ndarray,
+    occluders: Patches,
+    parts: np.ndarray,
+    owners: np.ndarray,
+    settings: VlodSettings,
+    *,
+    objects: int | None = None,
+    threads: int = 1,
+    device: str = "cpu",
+) -> tuple[np.ndarray, VlodStats]:
+    """Objects that are hidden from all of a view cell.
+
+    Args:
+        cells: view cells [grid steps], shape (m, 2, 3), int32.
+        occluders: outlines of opaque discs, and of sections of solids for eyes outside them (`rectangle_outlines`).
+        parts: boxes that together hold each object [grid steps], shape (p, 2, 3), int32.
+        owners: object of each part, shape (p,), int.
+        settings: of the method.
+        objects: how many there are; by default one more than the last owner.
+        threads: CPU threads.
+        device: Warp device.
+
+    Returns:
+        Shape (m, objects), bool: true is never wrong, false may be. An object without parts is hidden. And what was
+        done.
+
+    Raises:
+        InputError: a shape or an owner.
+    """
+    cells, parts, owners = (np.asarray(x) for x in (cells, parts, owners))
+    objects = int(owners.max(initial=-1)) + 1 if objects is None else objects
+    if cells.shape[1:] != (2, 3) or parts.shape[1:] != (2, 3) or owners.shape != (len(parts),):
+        found = f"{cells.shape}, {parts.shape}, {owners.shape}"
+        raise InputError(f"cells, parts, owners: expected shapes (m, 2, 3), (p, 2, 3), (p,), found {found}")
+    if len(owners) and not 0 <= owners.min() <= owners.max() < objects:
+        raise InputError(f"owners: expected objects 0 to {objects - 1}, found {owners.min()} to {owners.max()}")
+    stats = VlodStats()
+    rng = np.random.default_rng(settings.seed)
+    method = _Method(occluders, parts.astype(np.int32), settings, stats, rng, threads, device)
+    hidden = np.ones((len(cells), objects), bool)
+    for row, cell in enumerate(cells):
+        seen = np.zeros(len(parts), bool)
+        for part in split_cell(cell, settings.split):
+            seen[~seen] = ~method.hidden(part, np.flatnonzero(~seen))
+        hidden[row, owners[seen]] = False
+    return hidden, stats
+
+
+def split_cell(cell: np.ndarray, count: int) -> np.ndarray:
+    """Boxes that tile a view cell, `count` on each axis, fewer where it is thinner [grid steps], shape (n, 2, 3)."""
+    borders = [np.unique(np.linspace(cell[0, axis], cell[1, axis], count + 1).astype(np.int64)) for axis in range(3)]
+    low = np.stack(np.meshgrid(*(b[:-1] for b in borders), indexing="ij"), axis=-1).reshape(-1, 3)
+    high = np.stack(np.meshgrid(*(b[1:] for b in borders), indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.stack([low, high], axis=1)
+
+
+@dataclass
+class _Method:
+    """Occluders, occludees and settings, and how one view cell is done with them."""
+
+    occluders: Patches
+    parts: np.ndarray
+    settings: VlodSettings
+    stats: VlodStats
+    rng: np.random.Generator
+    threads: int
+    device: str
+
+    def hidden(self, cell: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Whether each chosen part is hidden from a view cell, shape (len(chosen),), bool."""
+        options = {"threads": self.threads, "device": self.device}
+        with self.stats.phase("umbra"):
+            near = self._largest(cell)
+            umbras = launch_umbra(cell[None], self.occluders, np.column_stack([np.zeros_like(near), near]), **options)
+            usable = np.flatnonzero(umbras.status == USABLE)
+            self.stats.occluders += len(usable)
+        with self.stats.phase("solve"):
+            cluster = self._cluster(cell, near[usable])
+            points = self._points(cell, umbras, usable, cluster)
+        out = np.zeros(len(chosen), bool)
+        shell, limits = self._shells(cell, self.parts[chosen])
+        for number, limit in enumerate(limits):
+            mine = np.flatnonzero(shell == number)
+            if len(mine):
+                out[mine] = self._covered(umbras, usable, points, cluster, limit, self.parts[chosen[mine]])
+        return out
+
+    def _largest(self, cell: np.ndarray) -> np.ndarray:
+        """Occluders of the largest solid angle about the cell's centre, roughly, in order."""
+        away = np.clip(cell.mean(axis=0), self.occluders.boxes[:, 0], self.occluders.boxes[:, 1]) - cell.mean(axis=0)
+        square = np.maximum((away * away).sum(axis=1), 1.0)
+        # Solid angle of a facing disc of the occluder's area, as near as the occluder's nearest point.
+        size = self.occluders.area * np.abs((away * self.occluders.normal).sum(axis=1)) / square**1.5
+        if len(size) <= self.settings.occluders:
+            return np.arange(len(size))
+        return np.sort(np.argpartition(-size, self.settings.occluders)[: self.settings.occluders])
+
+    def _cluster(self, cell: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Cluster of each chosen occluder: the direction nearest to that of its box's point nearest to the cell."""
+        centre = cell.mean(axis=0)
+        boxes = self.occluders.boxes[chosen]
+        towards = np.clip(centre, boxes[:, 0], boxes[:, 1]) - centre
+        return (towards @ cluster_directions(self.settings.clusters).T).argmax(axis=1)
+
+    def _points(self, cell: np.ndarray, umbras: Umbras, usable: np.ndarray, cluster: np.ndarray) -> np.ndarray:
+        """Projection point of each cluster, shape (clusters, 3)."""
+        count = self.settings.clusters
+        if self.settings.objective == "random":
+            return self.rng.uniform(cell[0], cell[1], (count, 3))
+        return np.tile(cell.mean(axis=0), (count, 1))
+
+    def _shells(self, cell: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Shell of each box, the narrowest that holds it, and the largest depth beyond an occluder in each shell.
+
+        What lies within a distance of the cell lies within that distance beyond any plane in front of it.
+        """
+        if not self.settings.shells:
+            return np.zeros(len(boxes), int), np.array([np.inf])
+        away = np.maximum(np.maximum(cell[0] - boxes[:, 0], boxes[:, 1] - cell[1]), 0).astype(float)
+        # A step more covers the rounding of the lengths.
+        distance = np.sqrt((away * away).sum(axis=1)) + 1
+        limits = distance.max(initial=1) / 2.0 ** np.arange(self.settings.shells)
+        return (distance[:, None] <= limits).sum(axis=1) - 1, limits
+
+    def _covered(
+        self,
+        umbras: Umbras,
+        usable: np.ndarray,
+        points: np.ndarray,
+        cluster: np.ndarray,
+        limit: float,
+        boxes: np.ndarray,
+    ) -> np.ndarray:
+        """Whether a cube map of some cluster covers each box, with occluders shrunk for a depth, shape (n,), bool."""
+        options = {"threads": self.threads, "device": self.device}
+        with self.stats.phase("shrink"):
+            limits = np.full(len(usable), limit)
+            polygons = launch_shrink(umbras, usable, points[cluster], limits, **options)
+            sizes = np.diff(polygons.starts)
+            left = sizes > 0
+            starts = np.concatenate([[0], np.cumsum(sizes[left])])
+            self.stats.drawn += int(left.sum())
+        with self.stats.phase("coverage"):
+            resolution = self.settings.resolution
+            maps = launch_coverage(points, polygons.corners, starts, cluster[left], resolution=resolution, **options)
+        with self.stats.phase("occludees"):
+            hidden = np.zeros(len(boxes), bool)
+            for number in np.unique(cluster[left]):
+                rest = np.flatnonzero(~hidden)
+                rows = np.column_stack([rest, np.full(len(rest), number)])
+                hidden[rest] = launch_occludees(maps, boxes, rows, threads=self.threads) == 1
+        return hidden
