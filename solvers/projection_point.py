@@ -34,12 +34,12 @@ from .result import Result, Status
 # Limits of the interior point method, in units of the cell's diagonal and of the largest coefficient.
 ITERATIONS = 60
 TOLERANCE = 1e-10
+# Keeps Newton's matrix regular where the normals leave a direction free; it slows steps down, the optimum stays.
+PROXIMAL = 1e-9
 # What still counts as solved.
 ACCURACY = 1e-8
 # Problems are solved so many at a time, with rows padded to a power of four, because each shape is compiled.
 BATCH = 64
-# Pulls the point to the centre where the normals leave a direction free.
-PULL = 1e-11
 # An occluder with a bounded umbra: no projection point gives it a shadow without limit. Follows the status of Umbras.
 BOUNDED = 4
 # A height that no occluder asks for in earnest, in cell diagonals: one hardly larger than the cell asks for any.
@@ -89,7 +89,7 @@ class Problem:
             gradient = 2 * (self.weights * (self.normals @ self.centre - self.targets)) @ self.normals
         largest = max(np.abs(hessian).max(), np.abs(gradient).max(), 1e-300)
         bounds = (self.bounds - self.rows @ self.centre) / self.scale
-        return hessian / largest + 2 * PULL * np.eye(3), gradient / largest, bounds
+        return hessian / largest, gradient / largest, bounds
 
 
 def excluded(umbras: Umbras) -> np.ndarray:
@@ -203,7 +203,8 @@ def solve_points(problems: list[Problem]) -> Result:
     """Projection points of clusters, all at once, by an interior point method (JAX, float64).
 
     Every point is in front of all occluders of its cluster, exactly; where the optimum is not, the cell's centre is
-    given instead. So it is where nothing is to be solved.
+    given instead. So it is where nothing is to be solved. Where optima fill a line or a face, as with parallel
+    occluders, the point is in the middle of them, as far as the barrier of the rows goes.
     """
     begin = time.perf_counter()
     count = len(problems)
@@ -223,10 +224,10 @@ def solve_points(problems: list[Problem]) -> Result:
             rows = chosen[first : first + BATCH]
             _solve_batch([problems[i] for i in rows], int(size), rows, result)
     for i in full:
-        if not in_front(problems[i], result.point[i]):
+        if result.status[i] == Status.INFEASIBLE:
             result.point[i] = problems[i].centre
-            if result.status[i] == Status.SOLVED:
-                result.status[i] = Status.REJECTED
+        elif not in_front(problems[i], result.point[i]):
+            result.point[i], result.status[i] = problems[i].centre, Status.REJECTED
     return Result(**{**vars(result), "seconds": time.perf_counter() - begin})
 
 
@@ -254,15 +255,15 @@ def _solve_batch(problems: list[Problem], size: int, rows: np.ndarray, result: R
     batch = [*problems, *[problems[0]] * (BATCH - len(problems))]
     parts = [p.scaled() for p in batch]
     hessian, gradient = (np.array([part[k] for part in parts]) for k in (0, 1))
-    a, c, mask = np.zeros((len(batch), size, 3)), np.full((len(batch), size), -1.0), np.zeros((len(batch), size))
+    # The rows that fill up say 0 >= -1.
+    a, c = np.zeros((len(batch), size, 3)), np.full((len(batch), size), -1.0)
     for i, p in enumerate(batch):
         a[i, : len(p.rows)] = p.rows
         c[i, : len(p.rows)] = parts[i][2]
-        mask[i, : len(p.rows)] = 1
     import jax
 
     with jax.enable_x64(True):
-        answers = [np.asarray(x)[: len(problems)] for x in _interior_point()(hessian, gradient, a, c, mask)]
+        answers = [np.asarray(x)[: len(problems)] for x in _interior_point()(hessian, gradient, a, c)]
     v, iterations, primal, dual, gap = answers
     converged = np.maximum(np.maximum(primal, dual), gap) <= ACCURACY
     for i, p in enumerate(problems):
@@ -280,44 +281,39 @@ def _interior_point() -> Callable:
     import jax
     import jax.numpy as jnp
 
-    def longest(x: jax.Array, dx: jax.Array, mask: jax.Array) -> jax.Array:
+    def longest(x: jax.Array, dx: jax.Array) -> jax.Array:
         """The step that keeps x + step dx positive."""
-        return jnp.min(jnp.where((mask > 0) & (dx < 0), -x / jnp.where(dx < 0, dx, -1.0), jnp.inf))
+        return jnp.min(jnp.where(dx < 0, -x / jnp.where(dx < 0, dx, -1.0), jnp.inf))
 
-    def solve(hessian: jax.Array, linear: jax.Array, a: jax.Array, c: jax.Array, mask: jax.Array) -> tuple:
-        count = mask.sum()
-
+    def solve(hessian: jax.Array, linear: jax.Array, a: jax.Array, c: jax.Array) -> tuple:
         def residuals(v: jax.Array, s: jax.Array, w: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
-            return hessian @ v + linear - a.T @ (mask * w), mask * (a @ v - c - s), (mask * s * w).sum() / count
+            """Gradient of the Lagrangian, violation of the rows, mean complementarity."""
+            return hessian @ v + linear - a.T @ w, a @ v - c - s, (s * w).mean()
 
         def error(v: jax.Array, s: jax.Array, w: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
             dual, primal, mu = residuals(v, s, w)
             value = jnp.abs(v @ hessian @ v / 2 + linear @ v)
-            return jnp.abs(primal).max(), jnp.abs(dual).max(), count * mu / (1 + value)
+            return jnp.abs(primal).max(), jnp.abs(dual).max(), len(c) * mu / (1 + value)
 
         def step(state: tuple) -> tuple:
             v, s, w, iteration = state
             dual, primal, mu = residuals(v, s, w)
-            ratio = mask * w / s
-            matrix = hessian + (a.T * ratio) @ a
+            ratio = w / s
+            matrix = hessian + (a.T * ratio) @ a + PROXIMAL * jnp.eye(3)
 
             def direction(target: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
                 """Newton step to complementarity s w = target."""
-                right = -dual + a.T @ (mask * (target / s - w) - ratio * primal)
-                dv = jnp.linalg.solve(matrix, right)
-                ds = mask * (a @ dv + primal)
-                return dv, ds, mask * (target / s - w) - ratio * ds
+                dv = jnp.linalg.solve(matrix, -dual + a.T @ (target / s - w - ratio * primal))
+                ds = a @ dv + primal
+                return dv, ds, target / s - w - ratio * ds
 
             _, ds, dw = direction(jnp.zeros_like(s))
-            ahead = jnp.minimum(1.0, jnp.minimum(longest(s, ds, mask), longest(w, dw, mask)))
-            after = (mask * (s + ahead * ds) * (w + ahead * dw)).sum() / count
+            ahead = jnp.minimum(1.0, jnp.minimum(longest(s, ds), longest(w, dw)))
+            after = ((s + ahead * ds) * (w + ahead * dw)).mean()
             dv, ds, dw = direction((after / mu) ** 3 * mu - ds * dw)
-            ahead_s = jnp.minimum(1.0, 0.995 * longest(s, ds, mask))
-            ahead_w = jnp.minimum(1.0, 0.995 * longest(w, dw, mask))
-            # Equal steps keep the gradient of a quadratic objective on its way to zero.
-            ahead = jnp.where(jnp.abs(hessian).max() > 1e-6, jnp.minimum(ahead_s, ahead_w), ahead_s)
-            ahead_w = jnp.where(jnp.abs(hessian).max() > 1e-6, ahead, ahead_w)
-            moved = (v + ahead * dv, s + ahead * ds, w + ahead_w * dw)
+            # Equal steps in both: with a quadratic objective others would not reduce the gradient.
+            ahead = jnp.minimum(1.0, 0.995 * jnp.minimum(longest(s, ds), longest(w, dw)))
+            moved = (v + ahead * dv, s + ahead * ds, w + ahead * dw)
             good = jnp.isfinite(moved[0]).all() & jnp.isfinite(moved[1]).all() & jnp.isfinite(moved[2]).all()
             kept = tuple(jnp.where(good, new, old) for new, old in zip(moved, (v, s, w), strict=True))
             return (*kept, jnp.where(good, iteration + 1, ITERATIONS))
@@ -325,7 +321,7 @@ def _interior_point() -> Callable:
         def unfinished(state: tuple) -> jax.Array:
             return (state[3] < ITERATIONS) & (jnp.array(error(*state[:3])).max() > TOLERANCE)
 
-        start = (jnp.zeros(3), jnp.where(mask > 0, jnp.maximum(-c, 1e-2), 1.0), jnp.ones_like(c) / count, 0)
+        start = (jnp.zeros(3), jnp.maximum(-c, 1e-2), jnp.ones_like(c) / len(c), 0)
         v, s, w, iteration = jax.lax.while_loop(unfinished, step, start)
         return (v, iteration, *error(v, s, w))
 

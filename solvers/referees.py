@@ -8,14 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .projection_point import PULL, Problem, in_front
+from .projection_point import Problem, in_front
 from .result import Result, Status
 
 
 def cone_point(problem: Problem) -> Result:
     """The quadratic programme as a second-order cone programme, by Clarabel (interior point, conic).
 
-    min t + pull of the centre, under || diag(sqrt w) (N v - b) || <= t: its objective is t**2, without the pull.
+    min t under || diag(sqrt w) (N v - b) || <= t and the rows; the objective is t**2.
 
     Args:
         problem: a quadratic one, with at least one occluder.
@@ -36,7 +36,7 @@ def cone_point(problem: Problem) -> Result:
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     solution = clarabel.DefaultSolver(
-        sparse.csc_matrix(np.diag([2 * PULL, 2 * PULL, 2 * PULL, 0.0])),
+        sparse.csc_matrix((4, 4)),
         np.array([0.0, 0, 0, 1]),
         sparse.csc_matrix(np.vstack([rows, cone])),
         np.concatenate([bounds, cone_bound]),
@@ -136,7 +136,7 @@ def _single(
     objective = problem.objective(point)
     status = Status.SOLVED if solved else Status.LIMIT
     if not in_front(problem, point):
-        point, status = problem.centre, Status.REJECTED if solved else status
+        point, status = problem.centre, Status.REJECTED
     return _result(point, objective, status, iterations, residuals, begin)
 
 

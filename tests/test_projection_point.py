@@ -15,7 +15,6 @@ from viewcell.kernels.shadow import STRADDLES, USABLE, launch_shrink, launch_umb
 from viewcell.solvers.projection_point import (
     BOUNDED,
     MOST_HEIGHT,
-    PULL,
     Problem,
     cluster_problems,
     excluded,
@@ -185,7 +184,7 @@ def test_small_cone_programmes_satisfy_the_exact_optimality_conditions():
 def test_parallel_occluders_leave_the_point_on_the_axis_they_leave_free():
     near, far = rectangle(0, 3000, -4000, 5000, -4000, 5000), rectangle(0, 5000, -9000, 9000, -9000, 9000)
     _, problem = one_problem([near, far])
-    assert np.linalg.matrix_rank(problem.scaled()[0], tol=10 * PULL) == 1
+    assert np.linalg.matrix_rank(problem.scaled()[0], tol=1e-9) == 1
     result = solve_points([problem])
     assert result.status[0] == Status.SOLVED
     assert result.objective[0] == pytest.approx(cone_point(problem).objective[0], rel=1e-6)
@@ -199,6 +198,22 @@ def test_an_apex_that_can_be_reached_is_the_optimum():
     assert problem.targets[0] == pytest.approx(-750, abs=1e-3)
     assert problem.normals[0] @ result.point[0] == pytest.approx(-750, abs=0.1)
     assert np.abs(problem.rows @ result.point[0] - problem.bounds).min() < 0.1
+
+
+def test_linear_weights_are_volumes():
+    _, problem = one_problem([rectangle(0, 3000, -2000, 3000, -2000, 3000)], objective="lp", depth=5000.0)
+    assert problem.weights[0] == pytest.approx(16 / 9 * 5000 * (2 * 3750 + 5000), rel=1e-4)
+
+
+@pytest.mark.parametrize("objective", ["socp", "lp"])
+def test_an_occluder_in_the_way_stops_the_point_before_its_plane(objective):
+    wall, way = rectangle(0, -2000, -500, 1500, -500, 1500), rectangle(0, 1200, -2000, 3000, -2000, 3000)
+    _, problem = one_problem([wall, way], objective=objective, depth=90_000.0)
+    problem = replace(problem, weights=np.array([1.0, 1e-6]))
+    free = replace(problem, rows=problem.rows[:-2], bounds=problem.bounds[:-2])
+    result = solve_points([problem, free])
+    assert result.status.tolist() == [Status.SOLVED, Status.REJECTED]
+    assert result.point[0][0] == pytest.approx(1199, abs=1e-2)
 
 
 def test_an_occluder_hardly_larger_than_the_cell_asks_for_no_more_than_the_reach():
@@ -251,24 +266,25 @@ def test_an_optimum_behind_an_occluder_is_rejected_for_the_centre():
 
 
 def test_rows_that_leave_nothing_are_reported():
-    impossible = box_problem(0.0, 30.0, rows=[[1.0, 0, 0], [-1.0, 0, 0]], bounds=[5.0, 5.0])
+    impossible = box_problem(0.0, 30.0, rows=[[1.0, 0, 0], [-1.0, 0, 0]], bounds=[5.0, 19.0])
     result = solve_points([impossible, box_problem(20.0, 30.0)])
     assert result.status.tolist() == [Status.INFEASIBLE, Status.SOLVED]
-    assert in_front(impossible, result.point[0])
+    assert result.point[0].tolist() == [0.0, 0.0, 0.0]
 
 
-@pytest.mark.parametrize("exponent", [2, 40])
-def test_the_last_test_before_use_is_exact(exponent):
-    """Beside the limit of 1/64 grid step and the float64 slack, by less than float64 sees in the sum."""
-    limit, step = Fraction(1, 64) + Fraction(1, 2**24), Fraction(1, 2**exponent)
-    normal = (0.6, 0.8, 0.0)
-    point = np.array([3.0, 1.0, 0.0])
-    far = float(sum(Fraction(n) * Fraction(x) for n, x in zip(normal, point.tolist(), strict=True)) + limit)
-    exact = Fraction(far) - sum(Fraction(n) * Fraction(x) for n, x in zip(normal, point.tolist(), strict=True))
-    assert in_front(box_problem(0.0, far, normal), point) == (exact >= limit)
-    assert in_front(box_problem(0.0, far + float(step), normal), point)
-    assert not in_front(box_problem(0.0, far - float(step), normal), point)
-    assert not in_front(box_problem(0.0, np.inf, normal), point * np.nan)
+def test_the_last_test_before_use_is_exact():
+    """Around the limit of 1/64 grid step and the float64 slack, nearer than float64 can tell."""
+    rng, limit, told = np.random.default_rng(9), Fraction(1, 64) + Fraction(1, 2**24), []
+    for _ in range(200):
+        normal, point = rng.normal(size=3), rng.uniform(-9000, 9000, 3)
+        reach = dot(*([Fraction(float(x)) for x in v] for v in (normal, point)))
+        far = float(reach + limit)
+        allowed = in_front(box_problem(0.0, far, normal), point)
+        assert allowed == (Fraction(far) - reach >= limit)
+        told.append((allowed, far - float(reach) >= float(limit)))
+    assert {True, False} == {allowed for allowed, _ in told}
+    assert any(allowed != naive for allowed, naive in told)
+    assert not in_front(box_problem(0.0, np.inf), np.full(3, np.nan))
 
 
 def test_batches_and_their_order_change_nothing():
@@ -286,7 +302,7 @@ def test_search_finds_what_the_programme_finds():
     found = searched_point(open_box, lambda v: -open_box.objective(v), reach=2.0, starts=3, evaluations=200)
     assert -found.objective[0] >= best.objective[0] - 1.0
     assert -found.objective[0] < 1e-3 * open_box.objective(open_box.centre)
-    assert found.iterations[0] <= 601
+    assert searched_point(open_box, lambda v: -open_box.objective(v), starts=1, evaluations=9).iterations[0] <= 11
     flat = searched_point(open_box, lambda v: 7.0, starts=2, evaluations=20)
     assert flat.point[0].tolist() == problem.centre.tolist() and flat.objective[0] == 7.0
 
