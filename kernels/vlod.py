@@ -18,12 +18,15 @@ import numpy as np
 
 from ..data.errors import InputError
 from ..data.patches import Patches
+from ..data.scene import GRID_LIMIT
 from .coverage import launch_coverage
 from .occludee import launch_occludees
 from .shadow import USABLE, Umbras, launch_shrink, launch_umbra
 
 CLUSTERS = (1, 6, 14, 26)
-OBJECTIVES = ("centre", "random")
+OBJECTIVES = ("centre", "random", "socp", "lp")
+# View cells whose projection points are solved for together.
+BLOCK = 16
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,8 @@ class VlodSettings:
 
     Attributes:
         clusters: of occluders by direction: 1, 6 (axes), 14 (and diagonals of the cube), 26 (and those of its faces).
-        objective: how projection points are chosen: "centre" of the cell, or a "random" point of it.
+        objective: how projection points are chosen: "centre" of the cell, a "random" point of it, or the optimum of the
+            second-order cone programme ("socp") or of the linear programme ("lp") of solvers/projection_point.py.
         resolution: pixels on a cube map face's side.
         shells: cube maps for occludees within the scene's diameter, half of it, a quarter, ...; 0 for a single map
             without a limit, as in the paper.
@@ -42,7 +46,7 @@ class VlodSettings:
     """
 
     clusters: int = 26
-    objective: str = "centre"
+    objective: str = "socp"
     resolution: int = 512
     shells: int = 0
     split: int = 1
@@ -159,16 +163,18 @@ def vlod_hidden(
         raise InputError(f"cells, parts, owners: expected shapes (m, 2, 3), (p, 2, 3), (p,), found {found}")
     if len(owners) and not 0 <= owners.min() <= owners.max() < objects:
         raise InputError(f"owners: expected objects 0 to {objects - 1}, found {owners.min()} to {owners.max()}")
-    stats = VlodStats()
-    rng = np.random.default_rng(settings.seed)
-    method = _Method(occluders, parts.astype(np.int32), settings, stats, rng, threads, device)
+    method = _Method(occluders, parts.astype(np.int32), settings, VlodStats(), threads, device)
     hidden = np.ones((len(cells), objects), bool)
-    for row, cell in enumerate(cells):
-        seen = np.zeros(len(parts), bool)
-        for part in split_cell(cell, settings.split):
-            seen[~seen] = ~method.hidden(part, np.flatnonzero(~seen))
-        hidden[row, owners[seen]] = False
-    return hidden, stats
+    split = [split_cell(cell, settings.split) for cell in cells]
+    block = max(1, BLOCK // settings.split**3)
+    for first in range(0, len(cells), block):
+        prepared = iter(method.prepare(np.concatenate(split[first : first + block])))
+        for row in range(first, min(first + block, len(cells))):
+            seen = np.zeros(len(parts), bool)
+            for _ in split[row]:
+                seen[~seen] = ~method.hidden(next(prepared), np.flatnonzero(~seen))
+            hidden[row, owners[seen]] = False
+    return hidden, method.stats
 
 
 def split_cell(cell: np.ndarray, count: int) -> np.ndarray:
@@ -180,34 +186,53 @@ def split_cell(cell: np.ndarray, count: int) -> np.ndarray:
 
 
 @dataclass
+class _View:
+    """A view cell, its usable occluders (rows of the umbras), their clusters, and the clusters' projection points."""
+
+    cell: np.ndarray
+    umbras: Umbras
+    rows: np.ndarray
+    cluster: np.ndarray
+    points: np.ndarray
+
+
+@dataclass
 class _Method:
-    """Occluders, occludees and settings, and how one view cell is done with them."""
+    """Occluders, occludees and settings, and how view cells are done with them."""
 
     occluders: Patches
     parts: np.ndarray
     settings: VlodSettings
     stats: VlodStats
-    rng: np.random.Generator
     threads: int
     device: str
 
-    def hidden(self, cell: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """Whether each chosen part is hidden from a view cell, shape (len(chosen),), bool."""
-        options = {"threads": self.threads, "device": self.device}
+    def prepare(self, cells: np.ndarray) -> list[_View]:
+        """Umbras and projection points of some view cells."""
         with self.stats.phase("umbra"):
-            near = self._largest(cell)
-            umbras = launch_umbra(cell[None], self.occluders, np.column_stack([np.zeros_like(near), near]), **options)
-            usable = np.flatnonzero(umbras.status == USABLE)
-            self.stats.occluders += len(usable)
+            chosen = [self._largest(cell) for cell in cells]
+            cell_of = np.repeat(np.arange(len(cells)), [len(c) for c in chosen])
+            occluder = np.concatenate(chosen)
+            pairs = np.column_stack([cell_of, occluder])
+            umbras = launch_umbra(cells, self.occluders, pairs, threads=self.threads, device=self.device)
+            self.stats.occluders += int((umbras.status == USABLE).sum())
         with self.stats.phase("solve"):
-            cluster = self._cluster(cell, near[usable])
-            points = self._points(cell, umbras, usable, cluster)
+            cluster = self._cluster(cells[cell_of], occluder)
+            points = self._points(cells, umbras, cell_of, cluster)
+        views = []
+        for number, cell in enumerate(cells):
+            rows = np.flatnonzero((umbras.status == USABLE) & (cell_of == number))
+            views.append(_View(cell, umbras, rows, cluster[rows], points[number]))
+        return views
+
+    def hidden(self, view: _View, chosen: np.ndarray) -> np.ndarray:
+        """Whether each chosen part is hidden from a view cell, shape (len(chosen),), bool."""
         out = np.zeros(len(chosen), bool)
-        shell, limits = self._shells(cell, self.parts[chosen])
+        shell, limits = self._shells(view.cell, self.parts[chosen])
         for number, limit in enumerate(limits):
             mine = np.flatnonzero(shell == number)
             if len(mine):
-                out[mine] = self._covered(umbras, usable, points, cluster, limit, self.parts[chosen[mine]])
+                out[mine] = self._covered(view, limit, self.parts[chosen[mine]])
         return out
 
     def _largest(self, cell: np.ndarray) -> np.ndarray:
@@ -220,57 +245,60 @@ class _Method:
             return np.arange(len(size))
         return np.sort(np.argpartition(-size, self.settings.occluders)[: self.settings.occluders])
 
-    def _cluster(self, cell: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """Cluster of each chosen occluder: the direction nearest to that of its box's point nearest to the cell."""
-        centre = cell.mean(axis=0)
-        boxes = self.occluders.boxes[chosen]
+    def _cluster(self, cells: np.ndarray, occluder: np.ndarray) -> np.ndarray:
+        """Cluster of each occluder: the direction nearest to that of its box's point nearest to the cell's centre."""
+        centre, boxes = cells.mean(axis=1), self.occluders.boxes[occluder]
         towards = np.clip(centre, boxes[:, 0], boxes[:, 1]) - centre
         return (towards @ cluster_directions(self.settings.clusters).T).argmax(axis=1)
 
-    def _points(self, cell: np.ndarray, umbras: Umbras, usable: np.ndarray, cluster: np.ndarray) -> np.ndarray:
-        """Projection point of each cluster, shape (clusters, 3)."""
-        count = self.settings.clusters
+    def _points(self, cells: np.ndarray, umbras: Umbras, cell_of: np.ndarray, cluster: np.ndarray) -> np.ndarray:
+        """Projection point of each cluster of each view cell, shape (cells, clusters, 3)."""
+        shape = (len(cells), self.settings.clusters, 3)
+        if self.settings.objective == "centre":
+            return np.broadcast_to(cells.mean(axis=1)[:, None], shape)
         if self.settings.objective == "random":
-            return self.rng.uniform(cell[0], cell[1], (count, 3))
-        return np.tile(cell.mean(axis=0), (count, 1))
+            # A cell's points depend on nothing but the cell and the seed.
+            seeds = [[self.settings.seed, *(cell.astype(np.int64) + GRID_LIMIT).ravel()] for cell in cells]
+            share = np.stack([np.random.default_rng(seed).random(shape[1:]) for seed in seeds])
+            return cells[:, None, 0] + share * (cells[:, None, 1] - cells[:, None, 0])
+        # Imported late: it takes seconds, and builds on kernels/shadow.py.
+        from ..solvers.projection_point import cluster_problems, solve_points
+        from ..solvers.result import Status
+
+        size = self.parts.max(axis=(0, 1), initial=1).astype(float) - self.parts.min(axis=(0, 1), initial=0)
+        only = {"objective": self.settings.objective, "depth": float(np.linalg.norm(size))}
+        result = solve_points(cluster_problems(umbras, cells, cell_of, cluster, self.settings.clusters, **only))
+        self.stats.fallbacks += int(np.isin(result.status, (Status.REJECTED, Status.INFEASIBLE)).sum())
+        return result.point.reshape(shape)
 
     def _shells(self, cell: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Shell of each box, the narrowest that holds it, and the largest depth beyond an occluder in each shell.
+        """Shell of each box, the narrowest that holds it, and the greatest depth beyond an occluder in each shell.
 
-        What lies within a distance of the cell lies within that distance beyond any plane in front of it.
+        What lies within a distance of the cell lies within that distance beyond any plane in front of it. Without
+        shells all boxes are in one.
         """
-        if not self.settings.shells:
-            return np.zeros(len(boxes), int), np.array([np.inf])
         away = np.maximum(np.maximum(cell[0] - boxes[:, 0], boxes[:, 1] - cell[1]), 0).astype(float)
         # A step more covers the rounding of the lengths.
         distance = np.sqrt((away * away).sum(axis=1)) + 1
-        limits = distance.max(initial=1) / 2.0 ** np.arange(self.settings.shells)
+        limits = distance.max(initial=1) / 2.0 ** np.arange(max(1, self.settings.shells))
         return (distance[:, None] <= limits).sum(axis=1) - 1, limits
 
-    def _covered(
-        self,
-        umbras: Umbras,
-        usable: np.ndarray,
-        points: np.ndarray,
-        cluster: np.ndarray,
-        limit: float,
-        boxes: np.ndarray,
-    ) -> np.ndarray:
+    def _covered(self, view: _View, limit: float, boxes: np.ndarray) -> np.ndarray:
         """Whether a cube map of some cluster covers each box, with occluders shrunk for a depth, shape (n,), bool."""
         options = {"threads": self.threads, "device": self.device}
         with self.stats.phase("shrink"):
-            limits = np.full(len(usable), limit)
-            polygons = launch_shrink(umbras, usable, points[cluster], limits, **options)
+            limits = np.full(len(view.rows), limit) if self.settings.shells else None
+            polygons = launch_shrink(view.umbras, view.rows, view.points[view.cluster], limits, **options)
             sizes = np.diff(polygons.starts)
             left = sizes > 0
-            starts = np.concatenate([[0], np.cumsum(sizes[left])])
-            self.stats.drawn += int(left.sum())
+            starts, cluster = np.concatenate([[0], np.cumsum(sizes[left])]), view.cluster[left]
+            self.stats.drawn += len(cluster)
         with self.stats.phase("coverage"):
             resolution = self.settings.resolution
-            maps = launch_coverage(points, polygons.corners, starts, cluster[left], resolution=resolution, **options)
+            maps = launch_coverage(view.points, polygons.corners, starts, cluster, resolution=resolution, **options)
         with self.stats.phase("occludees"):
             hidden = np.zeros(len(boxes), bool)
-            for number in np.unique(cluster[left]):
+            for number in np.unique(cluster):
                 rest = np.flatnonzero(~hidden)
                 rows = np.column_stack([rest, np.full(len(rest), number)])
                 hidden[rest] = launch_occludees(maps, boxes, rows, threads=self.threads) == 1

@@ -85,13 +85,17 @@ def office():
 SETTINGS = {
     "centre": CENTRE,
     "26 random": VlodSettings(objective="random"),
+    "26 cone programmes": VlodSettings(resolution=256),
+    "6 linear programmes": VlodSettings(clusters=6, objective="lp", resolution=256),
     "8 shells": replace(CENTRE, shells=8),
     "6 clusters, split": replace(CENTRE, clusters=6, split=2, resolution=128),
     "all occluders": replace(CENTRE, clusters=14, occluders=10**6),
 }
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if "linear" in name else []) for name in SETTINGS]
+)
 def test_nothing_that_a_ray_sees_is_hidden(office, name):
     hidden, stats = office.hidden(SETTINGS[name])
     for cell, row in zip(office.cells, hidden, strict=True):
@@ -108,8 +112,14 @@ def test_shells_and_split_cells_hide_more(office):
     assert one < split
 
 
-def test_cells_threads_and_order_change_nothing(office):
-    settings = replace(CENTRE, clusters=6)
+def test_projection_points_hide_more_than_the_centre(office):
+    centre, socp = (office.hidden(replace(CENTRE, clusters=26, objective=kind))[0].sum() for kind in ("centre", "socp"))
+    assert centre < socp
+
+
+@pytest.mark.parametrize("objective", ["centre", "random"])
+def test_cells_threads_and_order_change_nothing(office, objective):
+    settings = replace(CENTRE, clusters=6, objective=objective)
     together, _ = office.hidden(settings)
     alone = np.concatenate([office.hidden(settings, office.cells[k : k + 1], threads=2)[0] for k in range(4)])
     np.testing.assert_array_equal(together, alone)
