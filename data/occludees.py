@@ -14,8 +14,8 @@ from .incidence import CHUNK, clip_bounds
 from .scene import Scene
 
 # Pieces are no smaller than this, and at most PIECES along an axis of their object.
-PIECE_M = 0.5
-PIECES = 8
+PIECE_M = 1.0
+PIECES = 4
 # Bounds of a node that holds nothing.
 NOWHERE = 2**25
 

@@ -20,7 +20,7 @@ from .solids import closed_elements
 from .subdivide import PlaneIndex
 
 # Regions and pieces of furniture below this hide little and would fill the hierarchy.
-LEAST_M2 = 0.1
+LEAST_M2 = 0.5
 # An element thinner than this is also cut through its middle, which serves cells that touch its face.
 THIN_M = 0.6
 # Steps of the staircase along an oblique outline of a section.
