@@ -136,6 +136,9 @@ def bake(
     )
     graph = prepared.graph
     facts["budget_spent"] = spent
+    if scene is not None:
+        facts["counts"] = facts["counts"] | _triangle_counts(scene, graph, object_rows, threads, device)
+        clock.lap("back faces")
 
     def manifest() -> dict:
         return _manifest(facts, settings, print_, graph, cell_rows, object_rows, clock)
@@ -379,6 +382,24 @@ def _visibility(
         columns = (proofs.cell, proofs.boxes, proofs.starts, proofs.leaves)
         tables = certificate_tables(*columns, *engine.occluders, scene.grid_m)
     return *engine.join(parts), tables, spent
+
+
+def _triangle_counts(
+    scene: Scene, graph: CellGraph, rows: VisibleRows, threads: int | None, device: str
+) -> dict[str, int]:
+    """Triangles of all potential pairs, and those among them that face away from everywhere in their cell.
+
+    The second is what a renderer may leave out beside the potentially visible set, which it does not change. Source:
+    Chhugani et al. 2005, section 5.1.
+    """
+    from ..kernels.backface import build_cones, launch_backface
+    from ..kernels.launch import thread_count
+
+    sizes = np.bincount(scene.triangles()[1], minlength=len(scene.objects))
+    pairs = np.column_stack([rows.source, rows.target])
+    cones = build_cones(scene)
+    removed, whole = launch_backface(cones, graph.cells, pairs, threads=thread_count(threads), device=device)
+    return {"potential_triangles": int(sizes[rows.target].sum()), "back_facing_triangles": int(removed[~whole].sum())}
 
 
 def _refine(

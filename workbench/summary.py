@@ -26,6 +26,9 @@ def summary(bake: "Bake") -> str:
     lines += [f"warning: {text}" for text in facts.get("warnings", [])]
     rows = [(c.name, *c.columns()) for c in count_pairs(bake)]
     lines += ["", table(("seen from inhabitable cells", "potential", "seen", "overestimate", "unknown"), rows), ""]
+    if counts.get("potential_triangles"):
+        share = 100.0 * counts["back_facing_triangles"] / counts["potential_triangles"]
+        lines += [f"{share:.1f} % of the triangles in these sets face away from all of their cell", ""]
     lines.append("seconds: " + ", ".join(f"{name} {value:.1f}" for name, value in facts["seconds"].items()))
     return "\n".join(lines + _skipped(facts.get("skipped", [])))
 
