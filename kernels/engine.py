@@ -98,10 +98,7 @@ class Sights:
             blockers: of the model's portal graph, if they are to hide too.
             shadows: whether occluders are to hide.
         """
-        corners, owners = scene.triangles()
-        solid = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners] & shadows
-        patches = find_patches(corners[solid], owners[solid], least_area=PATCH_M2 / scene.grid_m**2)
-        regions = find_regions(scene, self.opaque if shadows else NO_PLANES, sections=shadows)
+        regions, patches = find_occluders(scene, self.opaque if shadows else NO_PLANES, shadows=shadows)
         tree, shields = device_occluders(regions, patches, blockers, device)
         model = Occlusion(
             find_occludees(scene),
@@ -393,6 +390,20 @@ def join_objects(parts: list[Part]) -> VisibleRows:
     order = np.lexsort((columns[1], columns[0]))
     source, reached, seen, origin, end = (column[order] for column in columns)
     return VisibleRows(source.astype(np.int32), reached.astype(np.int32), seen, origin, end)
+
+
+def find_occluders(scene: Scene, opaque: OpaquePlanes, *, shadows: bool = True) -> tuple[Regions, Patches]:
+    """Axial regions and oblique patches of a model; none without `shadows`.
+
+    Args:
+        scene: the model.
+        opaque: opaque rectangles of its occluders and furniture.
+        shadows: whether there are to be any.
+    """
+    corners, owners = scene.triangles()
+    solid = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners] & shadows
+    patches = find_patches(corners[solid], owners[solid], least_area=PATCH_M2 / scene.grid_m**2)
+    return find_regions(scene, opaque, sections=shadows), patches
 
 
 def with_details(scene: Scene, opaque: OpaquePlanes) -> OpaquePlanes:

@@ -21,7 +21,7 @@ from ..data.regions import Regions
 from ..data.solids import SolidIndex
 from .cell_visibility import seeds, segments
 from .object_visibility import ObjectRows
-from .shaft import ShaftAnswers, Shields, device_shields, patches_met, launch_shaft
+from .shaft import ShaftAnswers, Shields, device_shields, launch_shaft, patches_met
 from .sightline import AimTargets, Triangles, launch_aim
 from .target import BlockerTree, TargetAnswers, blocker_tree, launch_target_search
 

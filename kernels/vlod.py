@@ -177,6 +177,41 @@ def vlod_hidden(
     return hidden, method.stats
 
 
+@dataclass
+class ShrunkOccluders:
+    """What is drawn into the cube maps of one view cell.
+
+    Attributes:
+        points: projection point of each cluster [grid steps], shape (clusters, 3), float64.
+        corners: of the shrunk occluders, one after the other [grid steps], shape (total, 3), float64.
+        starts: occluder i is corners[starts[i]:starts[i + 1]], shape (n + 1,), int64.
+        cluster: of each, shape (n,), int.
+    """
+
+    points: np.ndarray
+    corners: np.ndarray
+    starts: np.ndarray
+    cluster: np.ndarray
+
+
+def shrunk_occluders(
+    cell: np.ndarray,
+    occluders: Patches,
+    parts: np.ndarray,
+    settings: VlodSettings,
+    *,
+    threads: int = 1,
+    device: str = "cpu",
+) -> ShrunkOccluders:
+    """Projection points and shrunk occluders of a view cell, to look at; arguments as of `vlod_hidden`."""
+    method = _Method(occluders, np.asarray(parts, np.int32), settings, VlodStats(), threads, device)
+    view = method.prepare(np.asarray(cell)[None])[0]
+    polygons = launch_shrink(view.umbras, view.rows, view.points[view.cluster], None, threads=threads, device=device)
+    sizes = np.diff(polygons.starts)
+    starts = np.concatenate([[0], np.cumsum(sizes[sizes > 0])])
+    return ShrunkOccluders(view.points, polygons.corners, starts, view.cluster[sizes > 0])
+
+
 def split_cell(cell: np.ndarray, count: int) -> np.ndarray:
     """Boxes that tile a view cell, `count` on each axis, fewer where it is thinner [grid steps], shape (n, 2, 3)."""
     borders = [np.unique(np.linspace(cell[0, axis], cell[1, axis], count + 1).astype(np.int64)) for axis in range(3)]

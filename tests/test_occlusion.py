@@ -11,7 +11,7 @@ from viewcell.data.errors import InputError
 from viewcell.data.view_cells import as_graph
 from viewcell.kernels.engine import Sights
 from viewcell.kernels.occlusion import seen_objects
-from viewcell.workbench.bake import Settings, _opaque, bake
+from viewcell.workbench.bake import Settings, bake, opaque_rectangles
 from viewcell.workbench.cli import main
 from viewcell.workbench.verify import verify
 
@@ -186,6 +186,8 @@ def test_an_eye_beside_a_wall_sees_along_it():
     )
     scene = SOLIDS["scene_of_meshes"]([wall, behind, before])
     cells = np.array([[[-1024, 4096, 4096], [0, 5120, 5120]]], np.int32)
-    model, _ = Sights(scene, _opaque(scene), cells, "cpu").occlusion(scene, as_graph(cells).cells, 0, 1, "cpu")
+    model, _ = Sights(scene, opaque_rectangles(scene), cells, "cpu").occlusion(
+        scene, as_graph(cells).cells, 0, 1, "cpu"
+    )
     rows, _ = seen_objects(model, np.array([0]))
     assert rows.target.tolist() == [0, 2] and rows.seen.all()

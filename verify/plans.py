@@ -1,6 +1,7 @@
 """Pictures of a bake: storey plans, and the potentially visible set of a cell in plan and elevation."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,8 @@ COLOURS = {
     "other": "#ffffff",
 }
 WALL, GLASS, PORTAL, OPENING, SIGHTLINE = "#222222", "#5fa8d3", "#d1495b", "#2a9d8f", "#023e8a"
+OBJECT_COLOURS = {"seen": "#3a86c8", "unknown": "#fb8500", "hidden": "#b8bec5"}
+SHRUNK = "#2b9348"
 CELL_EDGE, NO_CELL = "#9aa5b1", "#d3d8de"
 SECTION_HEIGHT_M = 1.2
 # Storeys are at least so far apart, and have at least this share of the largest one's floor area.
@@ -121,12 +124,13 @@ def section_lines(triangles: np.ndarray, section: Section) -> np.ndarray:
 class Painter:
     """Draws sections of one bake's graph and scene, in metres."""
 
-    def __init__(self, graph: CellGraph, scene: Scene | None, grid_m: float):
-        """Take the graph, the scene (None: cells alone) and the grid step [m]."""
-        self.graph, self.grid_m = graph, grid_m
+    def __init__(self, graph: CellGraph, scene: Scene | None, grid_m: float, *, whole: bool = False):
+        """Take the graph, the scene (None: cells alone) and the grid step [m]; `whole` shows all of the model."""
+        self.graph, self.grid_m, self._whole = graph, grid_m, whole
         triangles, owners = scene.triangles() if scene else (np.zeros((0, 3, 3), np.int32), np.zeros(0, np.int32))
         glass = scene.object_mask(Role.TRANSPARENT)[owners] if scene else np.zeros(0, bool)
         self._opaque, self._glass = triangles[~glass], triangles[glass]
+        self._triangles, self._owners = triangles, owners
 
     def storey(self, storey: Storey, title: str, path: Path) -> None:
         """Plan with cells and portals, written as PNG."""
@@ -181,6 +185,65 @@ class Painter:
         ]
         _finish(figure, handles, path)
 
+    def object_set(
+        self,
+        cell: int,
+        kinds: np.ndarray,
+        shadows: tuple[np.ndarray, np.ndarray, np.ndarray],
+        sightlines: np.ndarray,
+        title: str,
+        path: Path,
+    ) -> None:
+        """Plan and elevation of what a view cell sees, and of the shrunk occluders that hide the rest, written as PNG.
+
+        Args:
+            cell: the view cell.
+            kinds: "seen", "unknown" or "hidden" for each object, shape (objects,), str.
+            shadows: projection points [grid steps], shape (k, 3); corners of the shrunk occluders, one after the other,
+                shape (total, 3); and where each begins, shape (n + 1,).
+            sightlines: witnesses [grid steps], shape (n, 2, 3), float64.
+            title: of the picture.
+            path: of the PNG.
+        """
+        box = self.graph.cells[cell]
+        middle = np.floor(box.mean(axis=0)) + 0.5
+        span = np.ptp(self._triangles, axis=(0, 1))
+        sections = [
+            Section(2, middle[2]),
+            Section(1 if span[0] >= span[1] else 0, middle[1 if span[0] >= span[1] else 0]),
+        ]
+        figure, panels = self._figure(sections)
+        points, corners, starts = shadows
+        for axes, section in zip(panels, sections, strict=True):
+            axes.set_facecolor("white")
+            for kind, width in (("hidden", 0.6), ("seen", 1.6), ("unknown", 1.6)):
+                own = self._triangles[(kinds == kind)[self._owners]]
+                lines = section_lines(own, section) * self.grid_m
+                axes.add_collection(LineCollection(lines, colors=OBJECT_COLOURS[kind], linewidths=width, zorder=3))
+            fans = [
+                np.stack([corners[first], corners[i], corners[i + 1]])
+                for first, last in pairwise(starts)
+                for i in range(first + 1, last - 1)
+            ]
+            lines = section_lines(np.array(fans).reshape(-1, 3, 3), section) * self.grid_m
+            axes.add_collection(LineCollection(lines, colors=SHRUNK, linewidths=2.2, alpha=0.8, zorder=4))
+            lines = sightlines[:, :, section.across] * self.grid_m
+            axes.add_collection(LineCollection(lines, colors=SIGHTLINE, linewidths=0.5, alpha=0.5, zorder=5))
+            axes.add_patch(self._rectangle(box, section)).set(facecolor=COLOURS["source"], edgecolor=WALL, zorder=6)
+            axes.plot(*(points[:, section.across] * self.grid_m).T, "x", color=WALL, markersize=5, zorder=7)
+            height = section.level * self.grid_m
+            axes.set_title(
+                f"{'plan' if section.axis == 2 else 'elevation'}, cut at {'xyz'[section.axis]} = {height:.2f} m"
+            )
+        figure.suptitle(title)
+        words = {"seen": "object seen (witness)", "unknown": "object unknown (potential)", "hidden": "object hidden"}
+        handles = [Patch(facecolor=COLOURS["source"], edgecolor=WALL, label="view cell")]
+        handles += [Line2D([], [], color=OBJECT_COLOURS[k], lw=1.6, label=word) for k, word in words.items()]
+        handles += [Line2D([], [], color=SHRUNK, lw=2.2, label="shrunk occluder")]
+        handles += [Line2D([], [], color=WALL, marker="x", lw=0, label="projection point of a cluster")]
+        handles += [Line2D([], [], color=SIGHTLINE, lw=1, label="witness sightline, projected")]
+        _finish(figure, handles, path)
+
     def _geometry_handles(self) -> list:
         handles = [Patch(facecolor=NO_CELL, label="no cell")]
         handles += [Line2D([], [], color=WALL, lw=1.4, label="opaque surface")] if len(self._opaque) else []
@@ -189,6 +252,8 @@ class Painter:
     def _figure(self, sections: list[Section]) -> tuple[Figure, list[Axes]]:
         """A figure with panels in the model's proportions: stacked if it is wide, side by side if it is deep."""
         shown = self.graph.cells[self.graph.inhabitable] if self.graph.inhabitable.any() else self.graph.cells
+        if self._whole:
+            shown = np.concatenate([shown, [[self._triangles.min(axis=(0, 1)), self._triangles.max(axis=(0, 1))]]])
         low = shown[:, 0].min(axis=0) * self.grid_m - MARGIN_M
         high = shown[:, 1].max(axis=0) * self.grid_m + MARGIN_M
         spans = np.array([(high - low)[list(section.across)] for section in sections])

@@ -198,7 +198,7 @@ def _prepare(scene: Scene | None, graph_folder: Path | None, settings: Settings,
     if method == "auto":
         method = "occluders"
     portal_graph = build_graph(scene, settings, clock)[0] if method != "occluders" else None
-    opaque = _opaque(scene)
+    opaque = opaque_rectangles(scene)
     if cells == "octree":
         roots = octree_roots(scene, settings.cell_size_m)
         graph = as_graph(roots[walkable(roots, scene, opaque)])
@@ -210,7 +210,7 @@ def _prepare(scene: Scene | None, graph_folder: Path | None, settings: Settings,
     return _Prepared(scene, graph, opaque, facts | notes, True, method, portal_graph)
 
 
-def _opaque(scene: Scene) -> OpaquePlanes:
+def opaque_rectangles(scene: Scene) -> OpaquePlanes:
     """Opaque rectangles of a model's occluders."""
     triangles, owners = scene.triangles()
     return opaque_planes(triangles[scene.object_mask(Role.OCCLUDER)[owners]])
@@ -307,7 +307,7 @@ def build_graph(scene: Scene, settings: Settings, clock: Clock) -> tuple[CellGra
     """Cells, portals and inhabitable cells of a model, its opaque rectangles, and what the manifest says of them."""
     triangles, _ = scene.triangles()
     clock.lap("read")
-    opaque = _opaque(scene)
+    opaque = opaque_rectangles(scene)
     margin = round(MARGIN_M / scene.grid_m)
     # The grid's own limit is where the kernels stop being exact.
     low = np.maximum(triangles.min(axis=(0, 1)).astype(np.int64) - margin, -GRID_LIMIT)

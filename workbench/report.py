@@ -66,7 +66,7 @@ def choose_cells(bake: "Bake") -> dict[int, str]:
     sources = np.flatnonzero(bake.graph.inhabitable)
     if not len(sources):
         return {}
-    potential = bake.potential_cells[sources].sum(axis=1)
+    potential = _potential(bake)[sources].sum(axis=1)
     seen = _seen_counts(bake)[sources]
     ratio = potential / np.maximum(seen, 1)
     by_size = np.argsort(potential, kind="stable")
@@ -83,24 +83,79 @@ def choose_cells(bake: "Bake") -> dict[int, str]:
 
 
 def _seen_counts(bake: "Bake") -> np.ndarray:
-    """Number of witnessed cells of every cell, shape (cells,), int."""
-    return np.bincount(visible_rows(bake.cell_to_cell)["cell_id"].to_numpy(), minlength=bake.graph.cell_count)
+    """Number of witnessed cells, or objects of a bake that claims nothing of cells, of every cell, shape (cells,)."""
+    table = bake.cell_to_cell if bake.claims_cells else bake.cell_to_object
+    return np.bincount(visible_rows(table)["cell_id"].to_numpy(), minlength=bake.graph.cell_count)
+
+
+def _potential(bake: "Bake") -> np.ndarray:
+    """What `_seen_counts` counts, potentially visible, shape (cells, targets), bool."""
+    return bake.potential_cells if bake.claims_cells else bake.potential_objects
 
 
 def _write(bake: "Bake", chosen: dict[int, str], folder: Path) -> None:
-    painter, storeys = Painter(bake.graph, bake.scene, bake.grid_m), find_storeys(bake.graph, bake.grid_m)
+    painter = Painter(bake.graph, bake.scene, bake.grid_m, whole=not bake.claims_cells)
     name = model_name(bake)
-    lines = [f"# {name}", "", *_numbers(bake), "", "## Storeys", ""]
+    lines = [f"# {name}", "", *_numbers(bake), ""]
+    storeys = find_storeys(bake.graph, bake.grid_m) if bake.claims_cells else []
+    lines += ["## Storeys", ""] if storeys else []
     for number, storey in enumerate(storeys):
         title = f"Storey {number}: floor at {storey.floor * bake.grid_m:.2f} m, {len(storey.cells)} inhabitable cells"
         painter.storey(storey, f"{name}, {title[0].lower()}{title[1:]}", folder / f"storey-{number}.png")
         lines += [f"### {title}", "", f"![{title}](storey-{number}.png)", "", STOREY_CAPTION, ""]
     lines += ["## Potentially visible sets", "", *_set_table(bake, chosen), ""]
+    shadows = None if bake.claims_cells else _Shadows(bake)
     for cell, why in chosen.items():
-        title, caption = _draw_set(bake, painter, storeys, cell, folder / f"cell-{cell}.png")
+        path = folder / f"cell-{cell}.png"
+        if shadows is None:
+            title, caption = _draw_set(bake, painter, storeys, cell, path)
+        else:
+            title, caption = _draw_objects(bake, painter, shadows, cell, path)
         lines += [f"### Cell {cell}: {why}", "", f"![{title}](cell-{cell}.png)", "", caption, ""]
         lines += _unknown_targets(bake, cell)
     (folder / "report.md").write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+
+
+class _Shadows:
+    """Occluders of a model, and how vLOD's method shrinks them for a view cell."""
+
+    def __init__(self, bake: "Bake") -> None:
+        from ..data.occludees import find_occludees
+        from ..kernels.engine import find_occluders, with_details
+        from ..kernels.vlod import join_outlines, rectangle_outlines
+        from .bake import opaque_rectangles
+
+        regions, patches = find_occluders(bake.scene, with_details(bake.scene, opaque_rectangles(bake.scene)))
+        self._outlines = join_outlines(rectangle_outlines(regions.boxes), patches)
+        self._pieces = find_occludees(bake.scene).pieces
+        self._cells = bake.graph.cells
+
+    def of(self, cell: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Projection points, corners and starts of the shrunk occluders of a cell."""
+        from ..kernels.vlod import VlodSettings, shrunk_occluders
+
+        settings = VlodSettings(clusters=6, objective="socp")
+        found = shrunk_occluders(self._cells[cell], self._outlines, self._pieces, settings)
+        return found.points[np.unique(found.cluster)], found.corners, found.starts
+
+
+def _draw_objects(bake: "Bake", painter: Painter, shadows: _Shadows, cell: int, path: Path) -> tuple[str, str]:
+    """Draw the objects that a view cell sees; returns the picture's title and caption."""
+    seen, lines = _sights(bake, cell, "object")
+    kinds = np.where(bake.potential_objects[cell], "unknown", "hidden")
+    kinds[seen] = "seen"
+    unknown, hidden = (int((kinds == kind).sum()) for kind in ("unknown", "hidden"))
+    title = f"View cell {cell}: {len(seen):,} objects seen, {unknown:,} unknown, {hidden:,} hidden"
+    found = shadows.of(cell)
+    painter.object_set(cell, kinds, found, lines, title, path)
+    caption = (
+        f"Objects cut by the two sections: blue ones are seen from the red view cell, orange ones ({unknown:,} in all) "
+        f"may be, grey ones are proved hidden. Green are the occluders as vLOD's method shrinks them for projection "
+        f"points (crosses, one for each of six directions), {len(found[2]) - 1:,} in all: what they cover from such a "
+        f"point is hidden from the whole cell. The bake itself proves more, without projection points. "
+        f"The {len(lines)} lines are sightlines to the largest objects seen."
+    )
+    return title, caption
 
 
 def model_name(bake: "Bake") -> str:
@@ -161,7 +216,8 @@ def _sizes(bake: "Bake", kind: str) -> np.ndarray:
 def _unknown_targets(bake: "Bake", cell: int) -> list[str]:
     """Table of the largest targets that have neither witness nor proof."""
     rows = []
-    for kind, potential in (("cell", bake.potential_cells[cell]), ("object", bake.potential_objects[cell])):
+    kinds = [("cell", bake.potential_cells[cell])] if bake.claims_cells else []
+    for kind, potential in (*kinds, ("object", bake.potential_objects[cell])):
         unknown = potential.copy()
         unknown[_sights(bake, cell, kind)[0]] = False
         unknown[cell if kind == "cell" else []] = False
@@ -223,13 +279,13 @@ def _set_table(bake: "Bake", chosen: dict[int, str]) -> list[str]:
     """One row for each chosen cell."""
     seen = _seen_counts(bake)
     lines = [
-        "Cells that a cell sees, itself included:",
+        "Cells that a cell sees, itself included:" if bake.claims_cells else "Objects that a view cell sees:",
         "",
         "| cell | name | potential | seen | overestimate | unknown |",
     ]
     lines.append("|---|---|---|---|---|---|")
     for cell in chosen:
-        potential, known = int(bake.potential_cells[cell].sum()), int(seen[cell])
+        potential, known = int(_potential(bake)[cell].sum()), int(seen[cell])
         ratio = f"{potential / known:.3f}" if known else "no witness"
         lines.append(
             f"| {cell} | {bake.graph.cell_names[cell]} | {potential:,} | {known:,} | {ratio} | {potential - known:,} |"

@@ -1,0 +1,242 @@
+"""From-region occlusion, method beside method: how much each leaves potential, against what is seen, and in what time.
+
+Run `python -m viewcell.verify.bench.occlusion MODEL... [--cells N] [--rays N]`; a MODEL is anything that
+`viewcell bake` takes, or `office`. View cells are N boxes of 1 m and N as large as a room, drawn at random where
+somebody may stand under a ceiling. Seen is what a witness of the bake or one of the rays shows.
+"""
+
+import argparse
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ... import bake, verify
+from ...data.buildings.office import make_office
+from ...data.errors import InputError
+from ...data.readers import read
+from ...data.scene import Role, Scene
+from ...data.solids import triangles_meet_boxes
+from ...data.view_cells import as_graph, model_bounds
+from ...kernels.engine import Sights
+from ...kernels.occlusion import Occlusion, seen_objects
+from ...kernels.shaft import launch_shaft
+from ...kernels.vlod import VlodSettings, join_outlines, rectangle_outlines, vlod_hidden
+from ...workbench.bake import Settings, opaque_rectangles
+from ...workbench.verify import _make_caster, make_judge
+from ..findings import VerifyResult
+from .timing import commit, print_head, print_row, quiet
+
+RAYS = 10_000_000
+CELLS = 10
+CELL_M = 1.0
+ROOM_M = (8.0, 8.0, 3.0)
+ROOM_STEP_M = 0.25
+# No halving: one occluder for the whole cell and the whole box.
+WHOLE = 2**25
+HEAD = ("variant", "1 m: potential / seen", "median ms", "room: potential / seen", "median ms", "wrong hidden")
+
+Variant = Callable[[int], np.ndarray]
+
+
+def sample_cells(scene: Scene, count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Free boxes of 1 m with a floor below and a ceiling above, and others grown to the size of their rooms.
+
+    Returns:
+        Both [grid steps], shape (count, 2, 3), int32.
+
+    Raises:
+        InputError: no such place was found.
+    """
+    triangles, owners = scene.triangles()
+    solid = triangles[scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]]
+    low, high = model_bounds(scene)
+    side = round(CELL_M / scene.grid_m)
+    random = np.random.default_rng(seed)
+    bounds = np.stack([solid.min(axis=1), solid.max(axis=1)], axis=1)
+
+    def free(box: np.ndarray) -> bool:
+        near = np.flatnonzero(((bounds[:, 0] < box[1]) & (bounds[:, 1] > box[0])).all(axis=1))
+        return not triangles_meet_boxes(solid[near], np.repeat(box[None], len(near), axis=0)).any()
+
+    def column(box: np.ndarray) -> tuple[bool, bool]:
+        middle = box.mean(axis=0)
+        over = ((bounds[:, 0, :2] <= middle[:2]) & (bounds[:, 1, :2] >= middle[:2])).all(axis=1)
+        return bool((over & (bounds[:, 0, 2] >= box[1, 2])).any()), bool((over & (bounds[:, 1, 2] <= box[0, 2])).any())
+
+    found: list[np.ndarray] = []
+    for _ in range(200 * count * 20):
+        if len(found) == 2 * count:
+            break
+        corner = random.integers(low, np.maximum(high - side, low + 1))
+        box = np.stack([corner, corner + side])
+        if all(column(box)) and free(box):
+            found.append(box)
+    if len(found) < 2 * count:
+        raise InputError(f"{scene.source}: expected {2 * count} free places of {CELL_M} m, found {len(found)}")
+    rooms = [_grown(box, free, scene.grid_m) for box in found[count:]]
+    return np.array(found[:count], np.int32), np.array(rooms, np.int32)
+
+
+def _grown(box: np.ndarray, free: Callable[[np.ndarray], bool], grid_m: float) -> np.ndarray:
+    """The box, each side moved outwards until something stands there."""
+    step = round(ROOM_STEP_M / grid_m)
+    moving = [(side, axis) for axis in range(3) for side in (0, 1)]
+    while moving:
+        for side, axis in list(moving):
+            wider = box.copy()
+            wider[side, axis] += step if side else -step
+            if (wider[1, axis] - wider[0, axis]) * grid_m <= ROOM_M[axis] and free(wider):
+                box = wider
+            else:
+                moving.remove((side, axis))
+    return box
+
+
+def variants(scene: Scene, model: Occlusion, occluders: tuple) -> dict[str, Variant]:
+    """Functions from a view cell to the objects that it cannot see, shape (objects,), bool."""
+    occludees, count = model.occludees, len(scene.objects)
+    regions, patches = occluders
+    owners = np.repeat(np.arange(count), np.diff(occludees.starts))
+    present = np.flatnonzero(np.diff(occludees.starts))
+    outlines = join_outlines(rectangle_outlines(regions.boxes), patches)
+
+    def by_shaft(boxes: np.ndarray, of: np.ndarray, smallest: int, cap: int) -> Variant:
+        def hidden(cell: int) -> np.ndarray:
+            everything = np.concatenate([model.cells[cell : cell + 1], boxes])
+            rows = np.column_stack([np.zeros(len(boxes), int), 1 + np.arange(len(boxes))])
+            meet = (boxes[:, 0] < model.cells[cell, 1]) & (boxes[:, 1] > model.cells[cell, 0])
+            rows, own = rows[~meet.all(axis=1)], of[~meet.all(axis=1)]
+            verdict = launch_shaft(model.shields, everything, rows, smallest=(smallest, smallest), cap=cap).verdict
+            out = np.zeros(count, bool)
+            out[present] = True
+            out[of[meet.all(axis=1)]] = False
+            out[own[verdict != 0]] = False
+            return out
+
+        return hidden
+
+    def by_map(**settings: object) -> Variant:
+        def hidden(cell: int) -> np.ndarray:
+            chosen = VlodSettings(**settings)
+            found, _ = vlod_hidden(
+                model.cells[cell : cell + 1], outlines, occludees.pieces, owners, chosen, objects=count
+            )
+            return found[0]
+
+        return hidden
+
+    def by_lines(cell: int) -> np.ndarray:
+        out = np.ones(count, bool)
+        rows, _ = seen_objects(model, np.array([cell]))
+        out[rows.target] = False
+        return out
+
+    quarter = round(0.25 / scene.grid_m)
+    return {
+        "A umbra of regions, whole box": by_shaft(occludees.bounds[present], present, WHOLE, 1),
+        "A8 umbra of regions, pieces": by_shaft(occludees.pieces, owners, WHOLE, 1),
+        "B one point (centre), 256": by_map(clusters=1, resolution=256),
+        "B one point (centre), 512": by_map(clusters=1),
+        "B one point (centre), 1024": by_map(clusters=1, resolution=1024),
+        "B one point by (5), 512": by_map(clusters=1, objective="socp"),
+        "B one point by (6), 512": by_map(clusters=1, objective="lp"),
+        "B 512, depth-limited, 1 shell": by_map(clusters=1, shells=1),
+        "B 512, 8 shells": by_map(clusters=1, shells=8),
+        "C 6 clusters by (5), 512": by_map(clusters=6, objective="socp"),
+        "C 14 clusters by (5), 512": by_map(clusters=14, objective="socp"),
+        "C 26 clusters by (5), 512": by_map(clusters=26, objective="socp"),
+        "C 26 clusters by (6), 512": by_map(clusters=26, objective="lp"),
+        "D 26 clusters, centre, 512": by_map(clusters=26),
+        "D 26 clusters, random point, 512": by_map(clusters=26, objective="random"),
+        "E B centre 512, cell split in 8": by_map(clusters=1, split=2),
+        "F shafts, halved to 0.25 m": by_shaft(occludees.pieces, owners, quarter, 2000),
+        "G lines and shafts (default), with witnesses": by_lines,
+    }
+
+
+def compare(scene: Scene, name: str, count: int, rays: int, only: str) -> None:
+    """Print the table of one model."""
+    small, rooms = sample_cells(scene, count)
+    cells = np.concatenate([small, rooms])
+    opaque = opaque_rectangles(scene)
+    sights = Sights(scene, opaque, cells, "cpu")
+    model, occluders = sights.occlusion(scene, as_graph(cells).cells, 0, 1, "cpu")
+    seen = np.zeros((len(cells), len(scene.objects)), bool)
+    with tempfile.TemporaryDirectory() as folder:
+        table = Path(folder) / "cells.csv"
+        rows = cells.reshape(-1, 6) * scene.grid_m + np.tile(scene.origin, 2)
+        lines = [",".join(f"{value:.10f}" for value in row) for row in rows]
+        table.write_text("\n".join(["min_x,min_y,min_z,max_x,max_y,max_z", *lines]) + "\n")
+        made = bake(scene, Path(folder) / "cells.bake", settings=Settings(method="occluders", cells=str(table)))
+        result = verify(made, rays=rays)
+        found = made.cell_to_object
+        visible = np.array(found["verdict"].to_pylist()) == "visible"
+        seen[found["cell_id"].to_numpy()[visible], found["object_id"].to_numpy()[visible]] = True
+        seen |= _seen_by_rays(made, rays)
+    print(
+        f"\n{name}: {len(scene.objects):,} objects, {len(occluders[0].boxes):,} rectangles in "
+        f"{len(occluders[0].axis):,} regions, {len(occluders[1].area):,} oblique patches; seen {seen[:count].sum():,} / {seen[count:].sum():,}; "
+        f"verify: {result.rays:,} rays, {result.wrong_hidden} wrong hidden, {result.refuted} refuted\n",
+        flush=True,
+    )
+    print_head(HEAD)
+    for title, hidden in variants(scene, model, occluders).items():
+        if only and not any(title.startswith(start) for start in only.split(",")):
+            continue
+        hidden(0)
+        times, answers = [], []
+        for cell in range(len(cells)):
+            start = time.perf_counter()
+            answers.append(hidden(cell))
+            times.append(1e3 * (time.perf_counter() - start))
+        out = np.array(answers)
+        wrong = int((out & seen).sum())
+        columns: list[object] = [title]
+        for part in (slice(None, count), slice(count, None)):
+            ratio = (~out[part]).sum() / max(seen[part].sum(), 1)
+            columns += [
+                f"{ratio:.2f}",
+                f"{statistics.median(times[part]):,.0f} ({min(times[part]):,.0f}-{max(times[part]):,.0f})",
+            ]
+        print_row([*columns, wrong])
+
+
+def _seen_by_rays(made: object, rays: int) -> np.ndarray:
+    """Objects that rays from each cell hit, shape (cells, objects), bool."""
+    made.__dict__["potential_objects"] = np.ones_like(made.potential_objects)
+    caster, sources = _make_caster(made, make_judge(made), np.arange(made.graph.cell_count), rays, 1, VerifyResult())
+    each = -(-rays // len(sources))
+    for first in range(0, each, 50_000):
+        caster.cast(first, min(50_000, each - first))
+    out = np.zeros(made.potential_objects.shape, bool)
+    out[sources] = caster.seen_objects > 0
+    return out
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Print a table for each model."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("models", nargs="+", metavar="MODEL")
+    parser.add_argument("--cells", type=int, default=CELLS, help="of each size")
+    parser.add_argument("--rays", type=int, default=RAYS, help="over all cells")
+    parser.add_argument("--only", default="", help="letters of the variants, separated by commas")
+    options = parser.parse_args(arguments)
+    quiet()
+    print(f"commit {commit()}, one CPU thread; milliseconds a cell: median (least-most)")
+    for model in options.models:
+        try:
+            scene = make_office() if model == "office" else read(model)
+            compare(scene, Path(model).name, options.cells, options.rays, options.only)
+        except InputError as error:
+            print(error, file=sys.stderr)
+            return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
