@@ -178,9 +178,10 @@ def compare(scene: Scene, name: str, count: int, rays: int, only: str) -> None:
         visible = np.array(found["verdict"].to_pylist()) == "visible"
         seen[found["cell_id"].to_numpy()[visible], found["object_id"].to_numpy()[visible]] = True
         seen |= _seen_by_rays(made, rays)
+    regions, patches = occluders
     print(
-        f"\n{name}: {len(scene.objects):,} objects, {len(occluders[0].boxes):,} rectangles in "
-        f"{len(occluders[0].axis):,} regions, {len(occluders[1].area):,} oblique patches; seen {seen[:count].sum():,} / {seen[count:].sum():,}; "
+        f"\n{name}: {len(scene.objects):,} objects, {len(regions.boxes):,} rectangles in {len(regions.axis):,} regions, "
+        f"{len(patches.area):,} oblique patches; seen {seen[:count].sum():,} / {seen[count:].sum():,}; "
         f"verify: {result.rays:,} rays, {result.wrong_hidden} wrong hidden, {result.refuted} refuted\n",
         flush=True,
     )
