@@ -32,6 +32,7 @@ class StandIn:
     cell_to_object: pa.Table
     potential_cells: np.ndarray
     potential_objects: np.ndarray
+    claims_cells: bool = True
 
 
 def small_graph() -> CellGraph:

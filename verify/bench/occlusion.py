@@ -29,6 +29,7 @@ from ...kernels.vlod import VlodSettings, join_outlines, rectangle_outlines, vlo
 from ...workbench.bake import Settings, opaque_rectangles
 from ...workbench.verify import _make_caster, make_judge
 from ..findings import VerifyResult
+from ..witness import visible_rows
 from .timing import commit, print_head, print_row, quiet
 
 RAYS = 10_000_000
@@ -174,15 +175,15 @@ def compare(scene: Scene, name: str, count: int, rays: int, only: str) -> None:
         table.write_text("\n".join(["min_x,min_y,min_z,max_x,max_y,max_z", *lines]) + "\n")
         made = bake(scene, Path(folder) / "cells.bake", settings=Settings(method="occluders", cells=str(table)))
         result = verify(made, rays=rays)
-        found = made.cell_to_object
-        visible = np.array(found["verdict"].to_pylist()) == "visible"
-        seen[found["cell_id"].to_numpy()[visible], found["object_id"].to_numpy()[visible]] = True
+        rows = visible_rows(made.cell_to_object)
+        seen[rows["cell_id"].to_numpy(), rows["object_id"].to_numpy()] = True
         seen |= _seen_by_rays(made, rays)
     regions, patches = occluders
+    found = f"seen {seen[:count].sum():,} / {seen[count:].sum():,}"
+    checked = f"{result.rays:,} rays, {result.wrong_hidden} wrong hidden, {result.refuted} refuted"
     print(
-        f"\n{name}: {len(scene.objects):,} objects, {len(regions.boxes):,} rectangles in {len(regions.axis):,} regions, "
-        f"{len(patches.area):,} oblique patches; seen {seen[:count].sum():,} / {seen[count:].sum():,}; "
-        f"verify: {result.rays:,} rays, {result.wrong_hidden} wrong hidden, {result.refuted} refuted\n",
+        f"\n{name}: {len(scene.objects):,} objects, {len(regions.boxes):,} rectangles of {len(regions.axis):,} "
+        f"regions, {len(patches.area):,} oblique patches; {found}; verify: {checked}\n",
         flush=True,
     )
     print_head(HEAD)
