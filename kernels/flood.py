@@ -31,7 +31,7 @@ from .stab import (
     worst_cycle,
 )
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 f64 = wp.float64
 

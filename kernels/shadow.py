@@ -20,7 +20,7 @@ from ..data.errors import InputError
 from ..data.patches import LIMIT, Patches
 from .launch import SlotSizes, run_sliced, vectors
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 f64 = wp.float64
 i64 = wp.int64

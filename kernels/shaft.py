@@ -24,7 +24,7 @@ from ..data.regions import Regions
 from .launch import SlotSizes, run_sliced, vectors
 from .sightline import real
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 f64 = wp.float64
 

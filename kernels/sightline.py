@@ -15,7 +15,7 @@ import warp as wp
 from ..data.hierarchy import build_hierarchy
 from .launch import SlotSizes, run_sliced, vectors
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 f64 = wp.float64
 

@@ -6,7 +6,7 @@ import warp as wp
 from .graph import DeviceGraph
 from .launch import SlotSizes, run_sliced
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 f64 = wp.float64
 
