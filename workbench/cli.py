@@ -140,6 +140,14 @@ def _add_make(commands: argparse._SubParsersAction) -> None:
     office.add_argument("--rooms-per-side", type=_whole(1), help="offices on each side of the corridor; 8 by default")
     office.add_argument("--like", choices=["soda-hall"], help="a published model's size and statistics instead")
     _seed(office, "windows, doors and furniture")
+    for name, text in (("plant", "a process plant's hall"), ("city", "a quarter of a city")):
+        scaled = _command(buildings, name, "make_scaled", f"Make {text} of any size and print its size.")
+        scaled.set_defaults(building=name)
+        scaled.add_argument(
+            "--out", default=f"{name}.scene", help=f"X.scene (ready to bake) or X.glb; {name}.scene by default"
+        )
+        scaled.add_argument("--triangles", type=_whole(1), default=100_000, help="about how many; 100,000 by default")
+        _seed(scaled, "what stands where")
 
 
 def _add_bake(commands: argparse._SubParsersAction) -> None:

@@ -6,34 +6,62 @@ Nothing heavy is imported before it is needed: an argument that is wrong is refu
 import argparse
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..data.errors import InputError
 from .cli import FAILED, say
 from .summary import summary, table
 
+if TYPE_CHECKING:
+    from ..data.scene import Scene
+
 
 def make_office(options: argparse.Namespace) -> int:
     """Make an office, write it and print its levels of detail."""
-    from ..data.buildings.glb import write_glb
     from ..data.buildings.office import make_office as build
     from ..data.buildings.statistics import level_statistics
-    from ..data.scene_folder import write_scene
 
-    writers = {".scene": write_scene, ".glb": write_glb}
-    out = Path(options.out)
-    if out.suffix not in writers:
-        raise InputError(f"out: expected a name ending in {' or '.join(writers)}, found {options.out!r}")
+    out, write = _scene_writer(options.out)
     size = {"floors": options.floors, "rooms_per_side": options.rooms_per_side}
     size = {name: value for name, value in size.items() if value is not None}
     if options.like and size:
         raise InputError(f"like: expected no other size beside {options.like}, found {', '.join(size)}")
     scene = build(seed=options.seed, like=options.like, **size)
-    writers[out.suffix](scene, out)
+    write(scene, out)
     rows = [(r.level, r.objects, r.polygons, r.minimum, f"{r.mean:,.2f}", r.maximum) for r in level_statistics(scene)]
     say(table(("level of detail", "objects", "polygons", "min per object", "mean", "max"), rows))
     say(f"written to {out}")
     return 0
+
+
+def make_scaled(options: argparse.Namespace) -> int:
+    """Make a plant or a city of about so many triangles, write it and print its size."""
+    from ..data.buildings.city import make_city
+    from ..data.buildings.plant import make_plant
+    from ..data.buildings.statistics import level_statistics
+
+    out, write = _scene_writer(options.out)
+    build = {"plant": make_plant, "city": make_city}[options.building]
+    scene = build(seed=options.seed, triangles=options.triangles)
+    write(scene, out)
+    size = (level_statistics(scene)[-1].polygons, len(scene.objects), len(scene.definitions), len(scene.spaces))
+    say(table(("triangles", "objects", "definitions", "spaces"), [size]))
+    say(f"written to {out}")
+    return 0
+
+
+def _scene_writer(name: str) -> tuple[Path, Callable[["Scene", Path], None]]:
+    """Where to write a scene, and how, by the name's ending."""
+    from ..data.buildings.glb import write_glb
+    from ..data.scene_folder import write_scene
+
+    writers = {".scene": write_scene, ".glb": write_glb}
+    out = Path(name)
+    if out.suffix not in writers:
+        raise InputError(f"out: expected a name ending in {' or '.join(writers)}, found {name!r}")
+    return out, writers[out.suffix]
 
 
 def bake(options: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""Closed meshes for synthetic buildings: blocks on a lattice, boxes, cylinders and balls."""
+"""Closed meshes for synthetic buildings: blocks on a lattice, boxes, prisms, pipes, balls, solids of revolution."""
 
 from dataclasses import dataclass
 
@@ -127,6 +127,102 @@ class Ball:
 
 
 Shape = Box | Cylinder | Ball
+
+
+def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> Mesh:
+    """The 12 triangles of an axial box [m]."""
+    return Box(low, high).mesh(1)
+
+
+def revolved(profile: list[tuple[float, float]], sides: int) -> Mesh:
+    """A solid of revolution about the z axis, inscribed with `sides` sides.
+
+    Args:
+        profile: (radius, z) [m] from the bottom to the top; the first and the last radius are 0, no other is.
+        sides: 3 or more; 2 sides (len(profile) - 2) triangles.
+    """
+    radius, z = np.array(profile[1:-1], np.float64).T
+    turn = np.arange(sides) * (2 * np.pi / sides)
+    rings = np.empty((len(radius), sides, 3))
+    rings[:, :, 0], rings[:, :, 1] = radius[:, None] * np.cos(turn), radius[:, None] * np.sin(turn)
+    rings[:, :, 2] = z[:, None]
+    return _rings_mesh(rings, np.array([0, 0, profile[0][1]]), np.array([0, 0, profile[-1][1]]))
+
+
+def pipe(path: list[tuple[float, float, float]], radius: float, sides: int) -> Mesh:
+    """A round bar along a path of points [m], its ends flat; 2 sides len(path) triangles.
+
+    Bends should be cut into short steps (`bent`): each ring is square to the mean of the directions beside it.
+    """
+    points = np.array(path, np.float64)
+    steps = np.diff(points, axis=0)
+    steps /= np.linalg.norm(steps, axis=1, keepdims=True)
+    ahead = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    turn = np.arange(sides) * (2 * np.pi / sides)
+    across = np.cross(ahead[0], np.eye(3)[np.abs(ahead[0]).argmin()])
+    rings = []
+    for point, direction in zip(points, ahead, strict=True):
+        # The last ring's direction, made square to the new one, keeps the bar from twisting.
+        across = across - direction * (across @ direction)
+        across /= np.linalg.norm(across)
+        other = np.cross(direction, across)
+        rings.append(point + radius * (np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * other))
+    return _rings_mesh(np.array(rings), points[0], points[-1])
+
+
+def bent(path: list[tuple[float, float, float]], reach: float, steps: int = 4) -> list[tuple[float, float, float]]:
+    """The path with each corner replaced by a curve that begins and ends `reach` [m] from it."""
+    points = np.array(path, np.float64)
+    curved = [points[0]]
+    for before, corner, after in zip(points[:-2], points[1:-1], points[2:], strict=True):
+        start = corner + (before - corner) * (reach / np.linalg.norm(before - corner))
+        end = corner + (after - corner) * (reach / np.linalg.norm(after - corner))
+        share = np.linspace(0, 1, steps + 1)[:, None]
+        curved += list((1 - share) ** 2 * start + 2 * share * (1 - share) * corner + share**2 * end)
+    return [tuple(point) for point in [*curved, points[-1]]]
+
+
+def _rings_mesh(rings: np.ndarray, start: np.ndarray, end: np.ndarray) -> Mesh:
+    """Rings of points, counterclockwise seen from the end, joined to each other and closed to a point at both ends."""
+    count, sides, _ = rings.shape
+    here = np.arange(sides)
+    there = (here + 1) % sides
+    first, last = count * sides, count * sides + 1
+    top = (count - 1) * sides
+    faces = [np.stack([np.full(sides, first), there, here], axis=1)]
+    for base in range(0, top, sides):
+        faces.append(np.stack([base + here, base + there, base + sides + there], axis=1))
+        faces.append(np.stack([base + here, base + sides + there, base + sides + here], axis=1))
+    faces.append(np.stack([np.full(sides, last), top + here, top + there], axis=1))
+    return Mesh(np.concatenate([rings.reshape(-1, 3), [start, end]]), np.concatenate(faces).astype(np.int32))
+
+
+def extruded(outline: list[tuple[float, float]], low: float, high: float) -> Mesh:
+    """A prism over a convex outline, counterclockwise in x and y, between two heights [m]; 4 sides - 4 triangles."""
+    ring = np.array(outline, np.float64)
+    sides = len(ring)
+    here = np.arange(sides)
+    there = (here + 1) % sides
+    fan = np.stack([np.zeros(sides - 2, int), np.arange(1, sides - 1), np.arange(2, sides)], axis=1)
+    vertices = np.concatenate([np.column_stack([ring, np.full(sides, z)]) for z in (low, high)])
+    faces = [
+        np.stack([here, there, there + sides], axis=1),
+        np.stack([here, there + sides, here + sides], axis=1),
+        fan[:, ::-1],
+        fan + sides,
+    ]
+    return Mesh(vertices, np.concatenate(faces).astype(np.int32))
+
+
+def laid(mesh: Mesh, axis: int) -> Mesh:
+    """The mesh with its z axis laid along another one: 0 for x, 1 for y."""
+    return Mesh(mesh.vertices[:, [(2, 0, 1), (1, 2, 0)][axis]], mesh.faces, mesh.error_m)
+
+
+def moved(mesh: Mesh, by: tuple[float, float, float]) -> Mesh:
+    """The mesh elsewhere [m]."""
+    return Mesh(mesh.vertices + np.array(by), mesh.faces, mesh.error_m)
 
 
 def joined(meshes: list[Mesh], error_m: float = 0.0) -> Mesh:
