@@ -16,6 +16,8 @@ from .errors import InputError
 GRID_M = 2.0**-10
 # Coordinate differences stay below 2**25, so the products that the stabbing kernel forms are exact in float64.
 GRID_LIMIT = 2**24
+# Vertices or triangles that are placed at a time.
+FLAT_CHUNK = 200_000
 
 
 class Role(StrEnum):
@@ -128,17 +130,36 @@ class Scene:
 
     @cached_property
     def _flat(self) -> tuple[np.ndarray, np.ndarray, float]:
-        triangles, owners, worst = [np.zeros((0, 3, 3), np.int32)], [np.zeros(0, np.int32)], 0.0
-        for object_id, placed in enumerate(self.objects):
-            mesh = self.definitions[placed.definition_id].lods[0]
-            snapped = self.world_vertices(object_id)
-            if len(mesh.vertices):
-                world = mesh.vertices @ placed.transform[:3, :3].T + placed.transform[:3, 3]
-                worst = max(worst, float(np.abs(world - snapped * self.grid_m).max()))
-            corners = snapped[mesh.faces]
-            triangles.append(corners[~degenerate(corners)])
-            owners.append(np.full(len(triangles[-1]), object_id, np.int32))
-        return np.concatenate(triangles), np.concatenate(owners), worst
+        finest = [shape.lods[0] for shape in self.definitions]
+        of = np.array([placed.definition_id for placed in self.objects], np.int64)
+        sizes = np.array([len(mesh.faces) for mesh in finest], np.int64)[of]
+        starts = np.concatenate([[0], np.cumsum(sizes)])
+        triangles, kept, worst = np.empty((starts[-1], 3, 3), np.int32), np.ones(starts[-1], bool), 0.0
+        by_definition = np.argsort(of, kind="stable")
+        for same in np.split(by_definition, np.flatnonzero(np.diff(of[by_definition])) + 1):
+            mesh = finest[of[same[0]]] if len(same) else Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32))
+            # Many small instances at a time, few large ones.
+            step = max(1, FLAT_CHUNK // max(1, len(mesh.vertices), len(mesh.faces)))
+            for begin in range(0, len(same), step):
+                chunk = same[begin : begin + step]
+                transforms = np.stack([self.objects[i].transform for i in chunk])
+                world = mesh.vertices @ transforms[:, :3, :3].transpose(0, 2, 1) + transforms[:, None, :3, 3]
+                try:
+                    snapped = snap(world, self.grid_m, "")
+                except InputError:
+                    for object_id in range(len(self.objects)):
+                        self.world_vertices(object_id)  # raises, and names the first object at fault
+                    raise
+                if world.size:
+                    worst = max(worst, float(np.abs(world - snapped * self.grid_m).max()))
+                corners = snapped[:, mesh.faces]
+                rows = (starts[chunk][:, None] + np.arange(len(mesh.faces))).ravel()
+                triangles[rows] = corners.reshape(-1, 3, 3)
+                kept[rows] = ~degenerate(corners.reshape(-1, 3, 3))
+        owners = np.repeat(np.arange(len(self.objects), dtype=np.int32), sizes)
+        if not kept.all():
+            triangles, owners = triangles[kept], owners[kept]
+        return triangles, owners, worst
 
     def triangles(self) -> tuple[np.ndarray, np.ndarray]:
         """All snapped, non-degenerate finest-level triangles and their object ids.
@@ -182,7 +203,12 @@ def snap(metres: np.ndarray, grid_m: float, where: str) -> np.ndarray:
 def degenerate(triangles: np.ndarray) -> np.ndarray:
     """Triangles without area, exactly; shape (m,), bool, for corners of shape (m, 3, 3) in grid steps."""
     a, b = (triangles[:, 1] - triangles[:, 0]).astype(np.int64), (triangles[:, 2] - triangles[:, 0]).astype(np.int64)
-    return (np.cross(a, b) == 0).all(axis=1)
+    flat = np.arange(len(triangles))
+    for u, v in ((0, 1), (1, 2), (2, 0)):
+        flat = flat[a[flat, u] * b[flat, v] == a[flat, v] * b[flat, u]]
+    found = np.zeros(len(triangles), bool)
+    found[flat] = True
+    return found
 
 
 def source_path(path: str | Path) -> Path:
