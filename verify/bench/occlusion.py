@@ -39,9 +39,10 @@ ROOM_M = (8.0, 8.0, 3.0)
 ROOM_STEP_M = 0.25
 # No halving: one occluder for the whole cell and the whole box.
 WHOLE = 2**25
-HEAD = ("variant", "1 m: potential / seen", "median ms", "room: potential / seen", "median ms", "wrong hidden")
+HEAD = ("variant", "1 m: potential / seen", "ms", "room: potential / seen", "ms", "wrong hidden")
 
-Variant = Callable[[int], np.ndarray]
+# From view cells to what each cannot see, shape (cells, objects), bool.
+Variant = Callable[[np.ndarray], np.ndarray]
 
 
 def sample_cells(scene: Scene, count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -99,7 +100,7 @@ def _grown(box: np.ndarray, free: Callable[[np.ndarray], bool], grid_m: float) -
 
 
 def variants(scene: Scene, model: Occlusion, occluders: tuple) -> dict[str, Variant]:
-    """Functions from a view cell to the objects that it cannot see, shape (objects,), bool."""
+    """The methods to compare, by title."""
     occludees, count = model.occludees, len(scene.objects)
     regions, patches = occluders
     owners = np.repeat(np.arange(count), np.diff(occludees.starts))
@@ -107,54 +108,52 @@ def variants(scene: Scene, model: Occlusion, occluders: tuple) -> dict[str, Vari
     outlines = join_outlines(rectangle_outlines(regions.boxes), patches)
 
     def by_shaft(boxes: np.ndarray, of: np.ndarray, smallest: int, cap: int) -> Variant:
-        def hidden(cell: int) -> np.ndarray:
-            everything = np.concatenate([model.cells[cell : cell + 1], boxes])
-            rows = np.column_stack([np.zeros(len(boxes), int), 1 + np.arange(len(boxes))])
-            meet = (boxes[:, 0] < model.cells[cell, 1]) & (boxes[:, 1] > model.cells[cell, 0])
-            rows, own = rows[~meet.all(axis=1)], of[~meet.all(axis=1)]
-            verdict = launch_shaft(model.shields, everything, rows, smallest=(smallest, smallest), cap=cap).verdict
-            out = np.zeros(count, bool)
-            out[present] = True
-            out[of[meet.all(axis=1)]] = False
-            out[own[verdict != 0]] = False
+        def hidden(cells: np.ndarray) -> np.ndarray:
+            out = np.zeros((len(cells), count), bool)
+            out[:, present] = True
+            for row, cell in enumerate(cells):
+                meet = ((boxes[:, 0] < model.cells[cell, 1]) & (boxes[:, 1] > model.cells[cell, 0])).all(axis=1)
+                out[row, of[meet]] = False
+                everything = np.concatenate([model.cells[cell : cell + 1], boxes[~meet]])
+                rows = np.column_stack([np.zeros((~meet).sum(), int), np.arange(1, len(everything))])
+                verdict = launch_shaft(model.shields, everything, rows, smallest=(smallest, smallest), cap=cap).verdict
+                out[row, of[~meet][verdict != 0]] = False
             return out
 
         return hidden
 
-    def by_map(**settings: object) -> Variant:
-        def hidden(cell: int) -> np.ndarray:
-            chosen = VlodSettings(**settings)
-            found, _ = vlod_hidden(
-                model.cells[cell : cell + 1], outlines, occludees.pieces, owners, chosen, objects=count
-            )
-            return found[0]
+    def by_map(clusters: int, objective: str = "centre", **settings: int) -> Variant:
+        chosen = VlodSettings(clusters=clusters, objective=objective, **settings)
+
+        def hidden(cells: np.ndarray) -> np.ndarray:
+            return vlod_hidden(model.cells[cells], outlines, occludees.pieces, owners, chosen, objects=count)[0]
 
         return hidden
 
-    def by_lines(cell: int) -> np.ndarray:
-        out = np.ones(count, bool)
-        rows, _ = seen_objects(model, np.array([cell]))
-        out[rows.target] = False
+    def by_lines(cells: np.ndarray) -> np.ndarray:
+        out = np.ones((len(cells), count), bool)
+        rows, _ = seen_objects(model, cells)
+        out[np.searchsorted(cells, rows.source), rows.target] = False
         return out
 
     quarter = round(0.25 / scene.grid_m)
     return {
         "A umbra of regions, whole box": by_shaft(occludees.bounds[present], present, WHOLE, 1),
         "A8 umbra of regions, pieces": by_shaft(occludees.pieces, owners, WHOLE, 1),
-        "B one point (centre), 256": by_map(clusters=1, resolution=256),
-        "B one point (centre), 512": by_map(clusters=1),
-        "B one point (centre), 1024": by_map(clusters=1, resolution=1024),
-        "B one point by (5), 512": by_map(clusters=1, objective="socp"),
-        "B one point by (6), 512": by_map(clusters=1, objective="lp"),
-        "B 512, depth-limited, 1 shell": by_map(clusters=1, shells=1),
-        "B 512, 8 shells": by_map(clusters=1, shells=8),
-        "C 6 clusters by (5), 512": by_map(clusters=6, objective="socp"),
-        "C 14 clusters by (5), 512": by_map(clusters=14, objective="socp"),
-        "C 26 clusters by (5), 512": by_map(clusters=26, objective="socp"),
-        "C 26 clusters by (6), 512": by_map(clusters=26, objective="lp"),
-        "D 26 clusters, centre, 512": by_map(clusters=26),
-        "D 26 clusters, random point, 512": by_map(clusters=26, objective="random"),
-        "E B centre 512, cell split in 8": by_map(clusters=1, split=2),
+        "B one point (centre), 256": by_map(1, resolution=256),
+        "B one point (centre), 512": by_map(1),
+        "B one point (centre), 1024": by_map(1, resolution=1024),
+        "B one point by (5), 512": by_map(1, objective="socp"),
+        "B one point by (6), 512": by_map(1, objective="lp"),
+        "B 512, depth-limited, 1 shell": by_map(1, shells=1),
+        "B 512, 8 shells": by_map(1, shells=8),
+        "C 6 clusters by (5), 512": by_map(6, objective="socp"),
+        "C 14 clusters by (5), 512": by_map(14, objective="socp"),
+        "C 26 clusters by (5), 512": by_map(26, objective="socp"),
+        "C 26 clusters by (6), 512": by_map(26, objective="lp"),
+        "D 26 clusters, centre, 512": by_map(26),
+        "D 26 clusters, random point, 512": by_map(26, objective="random"),
+        "E B centre 512, cell split in 8": by_map(1, split=2),
         "F shafts, halved to 0.25 m": by_shaft(occludees.pieces, owners, quarter, 2000),
         "G lines and shafts (default), with witnesses": by_lines,
     }
@@ -190,21 +189,22 @@ def compare(scene: Scene, name: str, count: int, rays: int, only: str) -> None:
     for title, hidden in variants(scene, model, occluders).items():
         if only and not any(title.startswith(start) for start in only.split(",")):
             continue
-        hidden(0)
-        times, answers = [], []
-        for cell in range(len(cells)):
-            start = time.perf_counter()
-            answers.append(hidden(cell))
-            times.append(1e3 * (time.perf_counter() - start))
-        out = np.array(answers)
-        wrong = int((out & seen).sum())
+        hidden(np.arange(1))
         columns: list[object] = [title]
-        for part in (slice(None, count), slice(count, None)):
-            ratio = (~out[part]).sum() / max(seen[part].sum(), 1)
-            columns += [
-                f"{ratio:.2f}",
-                f"{statistics.median(times[part]):,.0f} ({min(times[part]):,.0f}-{max(times[part]):,.0f})",
-            ]
+        wrong = 0
+        for part in (np.arange(count), np.arange(count, 2 * count)):
+            # The projection points of several cells are solved together, as a bake would.
+            groups = [part] if title[0] in "BCDE" else part[:, None]
+            times, answers = [], []
+            for group in groups:
+                start = time.perf_counter()
+                answers.append(hidden(group))
+                times.append(1e3 * (time.perf_counter() - start) / len(group))
+            out = np.concatenate(answers)
+            wrong += int((out & seen[part]).sum())
+            ratio = (~out).sum() / max(seen[part].sum(), 1)
+            spread = f" ({min(times):,.0f}-{max(times):,.0f})" if len(times) > 1 else ""
+            columns += [f"{ratio:.2f}", f"{statistics.median(times):,.0f}{spread}"]
         print_row([*columns, wrong])
 
 
@@ -229,7 +229,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--only", default="", help="letters of the variants, separated by commas")
     options = parser.parse_args(arguments)
     quiet()
-    print(f"commit {commit()}, one CPU thread; milliseconds a cell: median (least-most)")
+    print(f"commit {commit()}, one CPU thread; ms a cell: median (least-most), or mean of cells done together")
     for model in options.models:
         try:
             scene = make_office() if model == "office" else read(model)
