@@ -135,31 +135,33 @@ class Scene:
         sizes = np.array([len(mesh.faces) for mesh in finest], np.int64)[of]
         starts = np.concatenate([[0], np.cumsum(sizes)])
         triangles, kept, worst = np.empty((starts[-1], 3, 3), np.int32), np.ones(starts[-1], bool), 0.0
-        by_definition = np.argsort(of, kind="stable")
-        for same in np.split(by_definition, np.flatnonzero(np.diff(of[by_definition])) + 1):
-            mesh = finest[of[same[0]]] if len(same) else Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32))
+        for definition_id in np.unique(of):
+            mesh, same = finest[definition_id], np.flatnonzero(of == definition_id)
             # Many small instances at a time, few large ones.
             step = max(1, FLAT_CHUNK // max(1, len(mesh.vertices), len(mesh.faces)))
             for begin in range(0, len(same), step):
                 chunk = same[begin : begin + step]
-                transforms = np.stack([self.objects[i].transform for i in chunk])
-                world = mesh.vertices @ transforms[:, :3, :3].transpose(0, 2, 1) + transforms[:, None, :3, 3]
-                try:
-                    snapped = snap(world, self.grid_m, "")
-                except InputError:
-                    for object_id in range(len(self.objects)):
-                        self.world_vertices(object_id)  # raises, and names the first object at fault
-                    raise
-                if world.size:
-                    worst = max(worst, float(np.abs(world - snapped * self.grid_m).max()))
-                corners = snapped[:, mesh.faces]
+                snapped, moved = self._placed(mesh, chunk)
+                worst = max(worst, moved)
+                corners = np.take(snapped, mesh.faces, axis=1).reshape(-1, 3, 3)
                 rows = (starts[chunk][:, None] + np.arange(len(mesh.faces))).ravel()
-                triangles[rows] = corners.reshape(-1, 3, 3)
-                kept[rows] = ~degenerate(corners.reshape(-1, 3, 3))
+                triangles[rows], kept[rows] = corners, ~degenerate(corners)
         owners = np.repeat(np.arange(len(self.objects), dtype=np.int32), sizes)
         if not kept.all():
             triangles, owners = triangles[kept], owners[kept]
         return triangles, owners, worst
+
+    def _placed(self, mesh: Mesh, object_ids: np.ndarray) -> tuple[np.ndarray, float]:
+        """Snapped vertices of a mesh for each object, (objects, n, 3), int32, and how far any has moved [m]."""
+        transforms = np.stack([self.objects[i].transform for i in object_ids])
+        world = mesh.vertices @ transforms[:, :3, :3].transpose(0, 2, 1) + transforms[:, None, :3, 3]
+        try:
+            snapped = snap(world, self.grid_m, "")
+        except InputError:
+            for object_id in range(len(self.objects)):
+                self.world_vertices(object_id)  # raises, and names the first object at fault
+            raise
+        return snapped, float(np.abs(world - snapped * self.grid_m).max(initial=0.0))
 
     def triangles(self) -> tuple[np.ndarray, np.ndarray]:
         """All snapped, non-degenerate finest-level triangles and their object ids.
