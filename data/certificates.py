@@ -4,7 +4,7 @@
 |---|---|
 | proofs.parquet | proof_id, cell_id, min_x ... max_z: whatever lies inside this box is hidden from the cell |
 | leaves.parquet | proof_id, occluder_id, v_min_x ... v_max_z, x_min_x ... x_max_z: the occluder blocks all segments from box v to box x; the leaves of a proof tile (cell, box) |
-| occluders.parquet | occluder_id, kind (region, patch), axis and coordinate of a region, its rectangles (list: min_u, min_v, max_u, max_v, ...), object_id of a patch and the corners of its outline (list: x, y, z, ...) |
+| occluders.parquet | occluder_id, kind (region, patch), axis and coordinate of a region, its rectangles (list: min_u, min_v, max_u, max_v, ...), object_id of a patch, the corners of its outline (list: x, y, z, ...), and the triangles of its disc (list: places among those of the object, degenerate ones not counted) |
 
 Metres, as in all tables of a bake.
 """  # noqa: E501 (a table row is one line)
@@ -19,7 +19,7 @@ from .regions import Regions
 CORNERS = ("min_x", "min_y", "min_z", "max_x", "max_y", "max_z")
 PROOFS = ("proof_id", "cell_id", *CORNERS)
 LEAVES = ("proof_id", "occluder_id", *(f"v_{name}" for name in CORNERS), *(f"x_{name}" for name in CORNERS))
-OCCLUDERS = ("occluder_id", "kind", "axis", "coordinate", "rectangles", "object_id", "corners")
+OCCLUDERS = ("occluder_id", "kind", "axis", "coordinate", "rectangles", "object_id", "corners", "triangles")
 
 
 def certificate_tables(
@@ -55,7 +55,8 @@ def certificate_tables(
     rows = [
         _region_row(regions, int(k), grid_m) if k < count else _patch_row(patches, int(k) - count, grid_m) for k in used
     ]
-    types = [pa.string(), pa.int8(), pa.float64(), pa.list_(pa.float64()), pa.int32(), pa.list_(pa.float64())]
+    metres, places = pa.list_(pa.float64()), pa.list_(pa.int32())
+    types = [pa.string(), pa.int8(), pa.float64(), metres, pa.int32(), metres, places]
     occluders = {"occluder_id": pa.array(used)}
     for i, (name, kind) in enumerate(zip(OCCLUDERS[1:], types, strict=True)):
         occluders[name] = pa.array([row[i] for row in rows], kind)
@@ -68,9 +69,10 @@ def _region_row(regions: Regions, region: int, grid_m: float) -> tuple:
     before = regions.open_before[t0:t1].reshape(len(us), len(vs))
     uncovered = before[1:, 1:] - before[:-1, 1:] - before[1:, :-1] + before[:-1, :-1]
     rectangles = decompose(uncovered == 0, us, vs) * grid_m
-    return "region", int(regions.axis[region]), float(regions.plane[region] * grid_m), rectangles.ravel(), None, None
+    axis, coordinate = int(regions.axis[region]), float(regions.plane[region] * grid_m)
+    return "region", axis, coordinate, rectangles.ravel(), None, None, None
 
 
 def _patch_row(patches: Patches, patch: int, grid_m: float) -> tuple:
     loop = patches.corners[patches.starts[patch] : patches.starts[patch + 1]]
-    return "patch", None, None, None, int(patches.owner[patch]), (loop * grid_m).ravel()
+    return "patch", None, None, None, int(patches.owner[patch]), (loop * grid_m).ravel(), patches.members[patch]

@@ -18,7 +18,7 @@ planarity: polygons that snapping has bent, groups of triangles with one average
 used as one occluder, and merging them is what makes occluders strong. That the outline is convex only makes (1) likely.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from heapq import heappop, heappush
 
 import numpy as np
@@ -53,6 +53,8 @@ class Patches:
         depth: least and greatest normal . vertex of the disc, rounded outwards, shape (n, 2), float64.
         owner: object_id, shape (n,), int32.
         area: area seen along the normal, squared grid steps, shape (n,), float64.
+        members: triangles of each disc, as places among its owner's in the order that they were given, int32; empty
+            where outlines were not found as discs.
     """
 
     corners: np.ndarray
@@ -62,6 +64,7 @@ class Patches:
     depth: np.ndarray
     owner: np.ndarray
     area: np.ndarray
+    members: list[np.ndarray] = field(default_factory=list)
 
 
 def find_patches(
@@ -95,28 +98,37 @@ def find_patches(
         )
     triangles = np.asarray(triangles, np.int64).reshape(-1, 3, 3)
     owners = np.asarray(owners)
+    places = _places(owners)
     kept = area_vectors(triangles).any(axis=1)
     if not axial:
         kept &= (np.ptp(triangles, axis=1) > 0).all(axis=1)
-    triangles, owners = triangles[kept], owners[kept]
+    triangles, owners, places = triangles[kept], owners[kept], places[kept]
     vertex = _weld(triangles, owners)
     _, single = np.unique(np.sort(vertex, axis=1), axis=0, return_index=True)
-    triangles, owners, vertex = triangles[single], owners[single], vertex[single]
+    triangles, owners, vertex, places = triangles[single], owners[single], vertex[single], places[single]
     twice = area_vectors(triangles).astype(np.float64)
     partner = _partners(vertex, twice, 2 * cos_limit**2 - 1)
     # Most triangles of a detailed model belong to no surface that is large enough.
     large = _surface_areas(partner, twice)[0] >= least_area
     renumbered = np.where(large, np.cumsum(large) - 1, -1)
     partner = np.where(partner >= 0, 3 * renumbered[partner // 3] + partner % 3, -1)[np.repeat(large, 3)]
-    return _collect(
-        triangles[large], owners[large], vertex[large], twice[large], partner, least_area, most_corners, cos_limit
-    )
+    mesh = _Mesh(triangles[large], vertex[large], twice[large], partner, most_corners, cos_limit)
+    return _collect(mesh, triangles[large], owners[large], places[large], twice[large], least_area)
 
 
 def area_vectors(triangles: np.ndarray) -> np.ndarray:
     """Twice the area times the normal of each triangle, exact, shape (m, 3), int64; zero where degenerate."""
     a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     return np.stack([a[:, i - 2] * b[:, i - 1] - a[:, i - 1] * b[:, i - 2] for i in range(3)], axis=1)
+
+
+def _places(owners: np.ndarray) -> np.ndarray:
+    """Place of each row among those of its owner, int32."""
+    order = np.argsort(owners, kind="stable")
+    ranked = owners[order]
+    places = np.empty(len(owners), np.int32)
+    places[order] = np.arange(len(owners)) - np.searchsorted(ranked, ranked)
+    return places
 
 
 def _weld(triangles: np.ndarray, owners: np.ndarray) -> np.ndarray:
@@ -159,18 +171,15 @@ def _surface_areas(partner: np.ndarray, twice: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _collect(
+    mesh: "_Mesh",
     triangles: np.ndarray,
     owners: np.ndarray,
-    vertex: np.ndarray,
+    places: np.ndarray,
     twice: np.ndarray,
-    partner: np.ndarray,
     least_area: float,
-    most_corners: int,
-    cos_limit: float,
 ) -> Patches:
     """Grow patches from the largest uncovered triangles and measure them."""
-    mesh = _Mesh(triangles, vertex, twice, partner, most_corners, cos_limit)
-    outlines, boxes, normals, depths, owner, areas = [], [], [], [], [], []
+    outlines, boxes, normals, depths, owner, areas, discs = [], [], [], [], [], [], []
     for seed in np.argsort(-(twice**2).sum(axis=1), kind="stable").tolist():
         if mesh.covered[seed]:
             continue
@@ -193,6 +202,7 @@ def _collect(
         depths.append((height.min() - slack, height.max() + slack))
         owner.append(owners[seed])
         areas.append(area)
+        discs.append(places[members])
     return Patches(
         np.concatenate([np.zeros((0, 3)), *outlines]).astype(np.int32),
         np.concatenate([[0], np.cumsum([len(outline) for outline in outlines])]).astype(np.int64),
@@ -201,6 +211,7 @@ def _collect(
         np.array(depths).reshape(-1, 2),
         np.array(owner, np.int32),
         np.array(areas, np.float64),
+        discs,
     )
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .rays import Caster
+from .shaft_certificate import Certified
 from .witness import Confirmed, visible_rows
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ class VerifyResult:
         counts: table of pairs.
         cell_witnesses: outcome of every stored cell-to-cell witness.
         object_witnesses: the same for cell-to-object.
+        certificates: outcome of every certificate; None for a bake without.
         seconds: by phase.
     """
 
@@ -79,6 +81,7 @@ class VerifyResult:
     counts: list[Counts] = field(default_factory=list)
     cell_witnesses: Confirmed = field(default_factory=Confirmed)
     object_witnesses: Confirmed = field(default_factory=Confirmed)
+    certificates: Certified | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -89,7 +92,8 @@ class VerifyResult:
     @property
     def ok(self) -> bool:
         """Nothing forbidden was found."""
-        return self.wrong_hidden == 0 and self.refuted == 0
+        unproved = self.certificates.failed if self.certificates else 0
+        return self.wrong_hidden == 0 and self.refuted == 0 and unproved == 0
 
     @property
     def rate_ratio(self) -> float:
@@ -113,6 +117,7 @@ class VerifyResult:
             ("inhabitable cells without a free point", f"{self.dark_cells:,}"),
             ("cell witnesses", witnesses[0]),
             ("object witnesses", witnesses[1]),
+            *([("certificates", self.certificates.line())] if self.certificates else []),
             ("seconds", ", ".join(f"{name} {value:.1f}" for name, value in self.seconds.items())),
         ]
         lines = ["| check | result |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows), ""]
@@ -120,6 +125,7 @@ class VerifyResult:
         for c in self.counts:
             lines.append(f"| {c.name} | {' | '.join(c.columns())} | {c.by_rays:,} |")
         refuted = [*self.cell_witnesses.examples, *self.object_witnesses.examples]
+        refuted += self.certificates.examples if self.certificates else []
         return "\n".join([*lines, *(["", *(f"refuted: {line}" for line in refuted)] if refuted else [])])
 
 

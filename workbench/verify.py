@@ -1,4 +1,4 @@
-"""Check a bake: rays that must see nothing hidden, and witnesses that must hold."""
+"""Check a bake: rays that must see nothing hidden, witnesses that must hold, and certificates if it has them."""
 
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +16,7 @@ from ..verify.aims import ORIGINS_MOST, aim_points, cell_origins, frontier_point
 from ..verify.casefile import WrongHidden, read_case, write_case
 from ..verify.findings import VerifyResult, count_pairs
 from ..verify.rays import Candidates, Caster
+from ..verify.shaft_certificate import check_certificates, has_certificates
 from ..verify.sightline import Sightlines
 from ..verify.walk import contact_links, portal_links
 from ..verify.witness import CHUNK, confirm_cells, confirm_objects, read_witnesses, visible_rows
@@ -61,6 +62,10 @@ def verify(bake: "Bake", *, rays: int = 1_000_000, seed: int = 0, progress: bool
     start = time.perf_counter()
     _confirm_all(bake, judge, progress, result)
     result.seconds["witnesses"] = time.perf_counter() - start
+    if has_certificates(bake):
+        start = time.perf_counter()
+        result.certificates = check_certificates(bake)
+        result.seconds["certificates"] = time.perf_counter() - start
     result.counts = count_pairs(bake, caster if rays else None)
     return result
 
