@@ -20,7 +20,7 @@ again, exactly, before a point is handed out.
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from itertools import combinations
@@ -40,6 +40,10 @@ PROXIMAL = 1e-9
 ACCURACY = 1e-8
 # Problems are solved so many at a time, with rows padded to a power of four, because each shape is compiled.
 BATCH = 64
+# Rows at work at once, rows added a round, and rounds before all rows are used.
+WORKING = 64
+ADDED = 8
+ROUNDS = 6
 # An occluder with a bounded umbra: no projection point gives it a shadow without limit. Follows the status of Umbras.
 BOUNDED = 4
 # A height that no occluder asks for in earnest, in cell diagonals: one hardly larger than the cell asks for any.
@@ -217,12 +221,16 @@ def solve_points(problems: list[Problem]) -> Result:
         0.0,
     )
     full = [i for i, p in enumerate(problems) if len(p.normals)]
-    sizes = np.array([_padded(len(problems[i].rows)) for i in full], int)
-    for size in np.unique(sizes):
-        chosen = np.array(full)[sizes == size]
-        for first in range(0, len(chosen), BATCH):
-            rows = chosen[first : first + BATCH]
-            _solve_batch([problems[i] for i in rows], int(size), rows, result)
+    # Of thousands of rows a few bind: those nearest to the centre first, then those that the point found violates.
+    working = {i: _nearest_rows(problems[i]) for i in full}
+    todo = full
+    for _ in range(ROUNDS):
+        _solve_all(problems, working, todo, result)
+        todo = [i for i in todo if _add_violated(problems[i], working, i, result.point[i])]
+        if not todo:
+            break
+    if todo:
+        _solve_all(problems, {i: np.arange(len(problems[i].rows)) for i in todo}, todo, result)
     for i in full:
         if result.status[i] == Status.INFEASIBLE:
             result.point[i] = problems[i].centre
@@ -248,6 +256,38 @@ def in_front(problem: Problem, point: np.ndarray) -> bool:
 def _padded(size: int) -> int:
     """The next power of four."""
     return 4 ** max(2, (int(size - 1).bit_length() + 1) // 2)
+
+
+def _nearest_rows(problem: Problem) -> np.ndarray:
+    """The rows that come nearest to the centre, ascending."""
+    if len(problem.rows) <= WORKING:
+        return np.arange(len(problem.rows))
+    slack = problem.rows @ problem.centre - problem.bounds
+    return np.sort(np.argpartition(slack, WORKING // 2)[: WORKING // 2])
+
+
+def _add_violated(problem: Problem, working: dict[int, np.ndarray], number: int, point: np.ndarray) -> bool:
+    """Add the rows that the point violates most to those at work; false if it violates none."""
+    short = problem.bounds - problem.rows @ point
+    short[working[number]] = -np.inf
+    worst = np.argsort(-short, kind="stable")[:ADDED]
+    worst = worst[short[worst] > ACCURACY * problem.scale]
+    working[number] = np.union1d(working[number], worst)
+    return len(worst) > 0
+
+
+def _solve_all(problems: list[Problem], working: dict[int, np.ndarray], chosen: list[int], result: Result) -> None:
+    """Solve the chosen problems with the rows at work, in batches of one padded size."""
+    sizes = np.array([_padded(len(working[i])) for i in chosen], int)
+    for size in np.unique(sizes):
+        members = np.array(chosen)[sizes == size]
+        for first in range(0, len(members), BATCH):
+            part = members[first : first + BATCH]
+            cut = [
+                replace(problems[i], rows=problems[i].rows[working[i]], bounds=problems[i].bounds[working[i]])
+                for i in part
+            ]
+            _solve_batch(cut, int(size), part, result)
 
 
 def _solve_batch(problems: list[Problem], size: int, rows: np.ndarray, result: Result) -> None:
