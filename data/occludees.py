@@ -6,6 +6,7 @@ around them are conservative.
 """
 
 from dataclasses import dataclass
+from hashlib import sha256
 
 import numpy as np
 
@@ -73,7 +74,30 @@ def _hierarchy(boxes: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
 def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pieces of all objects in object order, and the object of each."""
     triangles, owners = scene.triangles()
-    least = round(PIECE_M / scene.grid_m)
+    models = _models(triangles, owners, bounds)
+    cut = models[owners] == owners
+    boxes, owner = _cut(triangles[cut], owners[cut], bounds, round(PIECE_M / scene.grid_m))
+    first = np.searchsorted(owner, np.arange(len(bounds) + 1))
+    count = np.diff(first)[models]
+    objects = np.repeat(np.arange(len(bounds)), count)
+    row = np.arange(len(objects)) - np.repeat(np.cumsum(count) - count, count) + first[models[objects]]
+    shift = bounds[objects, 0] - bounds[models[objects], 0]
+    return (boxes[row] + shift[:, None]).astype(np.int32), objects
+
+
+def _models(triangles: np.ndarray, owners: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+    """The first object whose snapped triangles differ from an object's by a shift only, shape (objects,), int64."""
+    starts = np.searchsorted(owners, np.arange(len(bounds) + 1))
+    known: dict[bytes, int] = {}
+    models = np.arange(len(bounds))
+    for number in np.flatnonzero(np.diff(starts)):
+        relative = triangles[starts[number] : starts[number + 1]] - bounds[number, 0].astype(np.int32)
+        models[number] = known.setdefault(sha256(relative.tobytes()).digest(), int(number))
+    return models
+
+
+def _cut(triangles: np.ndarray, owners: np.ndarray, bounds: np.ndarray, least: int) -> tuple[np.ndarray, np.ndarray]:
+    """Pieces of the objects that own these triangles, and the object of each."""
     size = np.maximum(least, -(-(bounds[:, 1] - bounds[:, 0]) // PIECES))
     keys, boxes = [np.zeros((0, 4), np.int64)], [np.zeros((0, 2, 3), np.int64)]
     for begin in range(0, len(triangles), CHUNK):
@@ -102,7 +126,7 @@ def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         keys.append(key)
         boxes.append(box)
     key, box = _join(np.concatenate(keys), np.concatenate(boxes))
-    return box.astype(np.int32), key[:, 0]
+    return box, key[:, 0]
 
 
 def _join(keys: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -100,7 +100,9 @@ def _plane_regions(rectangles: np.ndarray, least: float) -> list[tuple[np.ndarra
         columns = np.concatenate([[True], (own[:, 1:] != own[:, :-1]).any(axis=0), [True]])
         own = own[rows[:-1]][:, columns[:-1]]
         u, v = u[rows], v[columns]
-        found.append((u, v, own, maximal_rectangles(own, own, u, v)))
+        whole = own.shape == (1, 1)
+        rectangles = np.stack([u, v], axis=1)[None] if whole else maximal_rectangles(own, own, u, v)
+        found.append((u, v, own, rectangles.astype(np.int32)))
     return found
 
 
@@ -149,6 +151,8 @@ class _Sections:
         self._solid_box = np.array([_is_box(t) for t in self._triangles], bool)
         self._least = least
         self._middle = self._boxes.sum(axis=1) // 2
+        self._heights: dict[tuple[int, int], np.ndarray] = {}
+        self._cut: dict[tuple[int, int, int], tuple[np.ndarray, bool]] = {}
         self._known: dict[tuple[int, int, int], np.ndarray] = {}
 
     def middles(self, axis: int, thin: int) -> np.ndarray:
@@ -174,21 +178,34 @@ class _Sections:
 
     def _section(self, element: int, axis: int, k: int, *, below: bool) -> np.ndarray:
         """Section just below or just above plane k."""
-        triangles = self._triangles[element]
-        heights = triangles[:, :, axis]
-        above = heights >= k if below else heights > k
-        cut = triangles[above.any(axis=1) & ~above.all(axis=1)]
-        # Between two heights of vertices a prism has one section: walls are cut by hundreds of planes.
-        prism = (_normals(cut)[:, axis] == 0).all()
-        if len(cut) > SECTION_TRIANGLES or not (prism or k == self._middle[element, axis]):
-            return np.zeros((0, 2, 2), np.int64)
-        key = (element, axis, int(heights[above].min()))
-        if prism and key in self._known:
+        heights = self._vertex_heights(element, axis)
+        # What is cut, and whether it is a prism there, changes only where the element has a vertex.
+        upper = int(heights[np.searchsorted(heights, k, "left" if below else "right")])
+        key = (element, axis, upper)
+        if key in self._known:
             return self._known[key]
+        if key not in self._cut:
+            triangles = self._triangles[element]
+            above = triangles[:, :, axis] >= upper
+            cut = triangles[above.any(axis=1) & ~above.all(axis=1)]
+            if len(cut) > SECTION_TRIANGLES:
+                self._known[key] = np.zeros((0, 2, 2), np.int64)
+                return self._known[key]
+            self._cut[key] = cut, bool((_normals(cut)[:, axis] == 0).all())
+        cut, prism = self._cut[key]
+        if not (prism or k == self._middle[element, axis]):
+            return np.zeros((0, 2, 2), np.int64)
         found = section_rectangles(cut, axis, k, below=below)
+        # Between two heights of vertices a prism has one section: walls are cut by hundreds of planes.
         if prism:
             self._known[key] = found
         return found
+
+    def _vertex_heights(self, element: int, axis: int) -> np.ndarray:
+        """Coordinates of an element's vertices along an axis, ascending."""
+        if (element, axis) not in self._heights:
+            self._heights[element, axis] = np.unique(self._triangles[element][:, :, axis])
+        return self._heights[element, axis]
 
 
 def _is_box(triangles: np.ndarray) -> bool:

@@ -10,6 +10,7 @@ from viewcell.data.buildings.machinery import PARTS, straight_pipe
 from viewcell.data.buildings.plant import BAY_M, HEIGHT_M, make_plant
 from viewcell.data.buildings.shapes import bent, extruded, laid, pipe, revolved
 from viewcell.data.errors import InputError
+from viewcell.data.occludees import find_occludees
 from viewcell.data.scene import Definition, Instance, Mesh, Role, Scene
 from viewcell.data.scene_folder import read_scene
 from viewcell.data.solids import SolidIndex, closed_elements
@@ -88,6 +89,14 @@ def test_the_first_object_out_of_bounds_is_named(plant):
     away = [Instance(name, "", 3 - k, np.eye(4) * 1e6, Role.DETAIL) for k, name in enumerate(("first", "second"))]
     with pytest.raises(InputError, match=r"object 5 'first': expected coordinates within"):
         Scene(plant.definitions, [*plant.objects[:5], *away]).triangles()
+
+
+def test_instances_have_the_pieces_that_each_has_alone(plant):
+    together = find_occludees(plant)
+    for object_id in range(0, len(plant.objects), 9):
+        alone = find_occludees(Scene(plant.definitions, [plant.objects[object_id]]))
+        own = slice(together.starts[object_id], together.starts[object_id + 1])
+        np.testing.assert_array_equal(together.pieces[own], alone.pieces)
 
 
 def test_every_object_is_closed_and_looks_outwards(plant):
