@@ -268,15 +268,15 @@ def shaft(draw, span, behind, *, flat):
     for box in (v, x):
         box[1] = box[0] + [draw(st.integers(least, 5)) for _ in range(3)]
     v[:, 2] -= v[1, 2] + draw(st.integers(0, 4))
-    x[:, 2] += behind + draw(st.integers(1, 5))
+    x[:, 2] += behind + draw(st.integers(0, 5))
     return v, x
 
 
 def turned_about(draw, *points):
-    """The points with their axes permuted and mirrored, far away from the origin, and where the last axis went."""
+    """The points with axes permuted and mirrored, small and far from the origin or large, and where axis 2 went."""
     order, signs = draw(st.permutations(range(3))), np.array([draw(st.sampled_from([-1, 1])) for _ in range(3)])
-    away = draw(st.sampled_from([0, 2**24 - 64]))
-    return [np.asarray(p)[..., order] * signs[order] + away * signs for p in points], order.index(2)
+    scale, away = draw(st.sampled_from([(1, 0), (1, 2**24 - 128), (2**17 + 1, 0)]))
+    return [np.asarray(p)[..., order] * signs * scale + away * signs for p in points], order.index(2)
 
 
 def boxes_of(*groups):
@@ -307,15 +307,42 @@ def test_discs_block_what_the_slow_reference_says(data):
     draw = data.draw
     v, x = shaft(draw, st.integers(-6, 6), 4, flat=draw(st.integers(0, 9)) == 0)
     size = draw(st.sampled_from([12, 20, 40]))
-    bend = st.integers(-1, 3)
+    bend = st.integers(0, 3)
     ring = [[-size, -size, draw(bend)], [size, -size, draw(bend)], [size, size, draw(bend)], [-size, size, draw(bend)]]
     away = [draw(st.integers(-20, 20)), draw(st.integers(-20, 20)), 1]
     ring = np.array(ring) + np.array(away)
     (v, x, ring), _ = turned_about(draw, v, x, ring)
+    # A step counts even where coordinates are large.
+    ring[0] += draw(st.integers(-1, 1))
     disc = Disc(ring.tolist(), np.array([ring[[0, 1, 2]], ring[[0, 2, 3]]], np.int64))
     v, x = boxes_of(v, x)
     fast = leaves_hold(np.concatenate([v, x])[None].astype(np.int32), np.zeros(1, int), [disc])[0]
     assert fast == leaf_holds(v, x, disc)
+
+
+def both_ways(v, x, occluder):
+    """What the fast check says of a leaf, and the slow one."""
+    boxes = np.array([[*v, *x]], np.int32)
+    return bool(leaves_hold(boxes, np.zeros(1, int), [occluder])[0]), leaf_holds(np.array(v), np.array(x), occluder)
+
+
+@pytest.mark.parametrize(("at", "holds"), [(-1, False), (0, True), (2, True), (4, True), (5, False)])
+def test_flat_shafts_may_run_along_the_border_of_a_region(at, holds):
+    region = Region(2, 0, np.array([[[0, 0], [2, 4]], [[2, 0], [4, 4]]]))
+    for v, x in product([[[at, 1, -3], [at, 2, -1]]], [[[at, 1, 2], [at, 3, 4]]]):
+        assert both_ways(v, x, region) == both_ways(x, v, region) == (holds, holds)
+
+
+@pytest.mark.parametrize(
+    ("eye", "far", "holds"),
+    [((-2, 0), (1, 3), True), ((-2, 1), (2, 3), False), ((-2, 0), (0, 3), False), ((0, 0), (1, 3), False)],
+)
+def test_a_disc_may_touch_the_cell_but_not_the_box(eye, far, holds):
+    ring = np.array([[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]])
+    disc = Disc(ring.tolist(), np.array([ring[[0, 1, 2]], ring[[0, 2, 3]]], np.int64))
+    for way in (1, -1):
+        v, x = (np.sort([[0, 0, way * a], [1, 1, way * b]], axis=0) for a, b in (eye, far))
+        assert both_ways(v, x, disc) == (holds, holds)
 
 
 def test_many_leaves_of_many_occluders_at_once():

@@ -165,6 +165,7 @@ class OpaqueSurfaces:
         for part in parts:
             if self._closed.get(part) is None:
                 self._closed[part] = closed(self._parts[part])
+            # What is inside on one side only is on the surface: one section would do, but two are cut less.
             if self._closed[part]:
                 yield self._cover(part, axis, plane, below=True)
                 yield self._cover(part, axis, plane, below=False)
