@@ -13,6 +13,7 @@ from viewcell.kernels.engine import Sights
 from viewcell.kernels.occlusion import seen_objects
 from viewcell.workbench.bake import Settings, bake, opaque_rectangles
 from viewcell.workbench.cli import main
+from viewcell.workbench.report import report
 from viewcell.workbench.verify import verify
 
 SOLIDS = runpy.run_path(str(Path(__file__).with_name("random_solids.py")))
@@ -191,3 +192,33 @@ def test_an_eye_beside_a_wall_sees_along_it():
     )
     rows, _ = seen_objects(model, np.array([0]))
     assert rows.target.tolist() == [0, 2] and rows.seen.all()
+
+
+def test_report_shows_shrunk_occluders(by_occluders, tmp_path):
+    text = report(by_occluders, cells=[0], out=tmp_path / "report").read_text()
+    assert (tmp_path / "report" / "cell-0.png").stat().st_size > 20_000
+    assert "shrinks them for projection points" in text and "Storeys" not in text
+
+
+def test_auto_takes_an_octree_for_very_large_models(tmp_path, monkeypatch):
+    monkeypatch.setattr("viewcell.workbench.bake.PORTAL_TRIANGLES", 10)
+    floor, crate = SOLIDS["box"]([0, 0, -0.2], [9, 9, 0]), SOLIDS["box"]([4, 4, 0], [5, 5, 2.5])
+    made = bake(SOLIDS["scene_of_meshes"]([floor, crate]), tmp_path / "open.bake", settings=Settings(depth=0))
+    assert made.manifest["inhabitable_because"] == "octree" and not made.claims_cells
+    assert verify(made, rays=50_000).ok
+
+
+def test_back_faces_are_counted_apart(by_occluders):
+    counts = by_occluders.manifest["counts"]
+    sizes = np.bincount(by_occluders.scene.triangles()[1])
+    assert counts["potential_triangles"] == (by_occluders.potential_objects @ sizes).sum()
+    assert 0.05 < counts["back_facing_triangles"] / counts["potential_triangles"] < 0.6
+
+
+@pytest.mark.parametrize("method", ["portals", "both"])
+def test_view_cells_beyond_the_portal_graph_are_refused(office, method, tmp_path):
+    cells = write_cells(tmp_path / "cells.csv", [BOXES[0], [-6, 2, 1, -5, 3, 2]])
+    with pytest.raises(InputError, match=r"within 2 m of the model, found cell 1 beyond"):
+        bake(office, tmp_path / "no.bake", settings=Settings(method=method, cells=cells))
+    made = bake(office, tmp_path / "yes.bake", settings=Settings(method="occluders", cells=cells))
+    assert verify(made, rays=100_000).ok and made.potential_objects[1].any()

@@ -50,8 +50,8 @@ class Settings:
         seal: cracks narrower than this are closed [m]; 0 closes none.
         doors: "open", or "closed" if doors occlude.
         method: "portals" (stabbing lines through a cell-and-portal graph), "occluders" (shadows of walls, furniture and
-            oblique surfaces), "both", or "auto": portals, and occluders for cells where portals leave much unknown or
-            where there are no rooms.
+            oblique surfaces), "both", or "auto": portals, and occluders for cells where portals leave much unknown, and
+            for models too large to be cut into cells.
         cells: view cells: "portals" for those of the graph, "octree", or a table of boxes. By default the method's own.
         cell_size_m: of the octree's roots.
         depth: times that a cell of the octree may be refined.
@@ -192,9 +192,7 @@ def _prepare(scene: Scene | None, graph_folder: Path | None, settings: Settings,
         cells = "octree" if method == "occluders" or (method == "auto" and large) else "portals"
     if cells == "portals":
         graph, opaque, notes = build_graph(scene, settings, clock)
-        if graph.inhabitable.any() or method != "auto" or settings.cells:
-            return _Prepared(scene, graph, opaque, facts | notes, False, method)
-        cells = "octree"
+        return _Prepared(scene, graph, opaque, facts | notes, False, method)
     if method == "auto":
         method = "occluders"
     portal_graph = build_graph(scene, settings, clock)[0] if method != "occluders" else None
@@ -206,8 +204,25 @@ def _prepare(scene: Scene | None, graph_folder: Path | None, settings: Settings,
     else:
         graph = read_view_cells(cells, scene)
         notes = {"inhabitable_because": "given"}
+    if portal_graph is not None:
+        _check_inside(graph, portal_graph, method)
     clock.lap("view cells")
     return _Prepared(scene, graph, opaque, facts | notes, True, method, portal_graph)
+
+
+def _check_inside(graph: CellGraph, portal_graph: CellGraph, method: str) -> None:
+    """The portal graph ends at its outermost faces, through which it knows no way: eyes beyond would see nothing.
+
+    Raises:
+        InputError: a view cell reaches out of it.
+    """
+    low, high = portal_graph.cells[:, 0].min(axis=0), portal_graph.cells[:, 1].max(axis=0)
+    beyond = np.flatnonzero((graph.cells[:, 0] < low).any(axis=1) | (graph.cells[:, 1] > high).any(axis=1))
+    if len(beyond):
+        raise InputError(
+            f"method {method}: expected view cells within {MARGIN_M:g} m of the model, found cell {beyond[0]} beyond; "
+            "the method occluders takes them"
+        )
 
 
 def opaque_rectangles(scene: Scene) -> OpaquePlanes:
