@@ -31,6 +31,8 @@ from .timing import commit, quiet
 
 SCENES = {"plant": make_plant, "city": make_city}
 CELL_M = (1.0, 2.0)
+# Phases of a bake that come before its first view cell.
+BEFORE = ("read", "view cells", "prepare")
 HEAD = (
     "scene",
     "triangles",
@@ -153,9 +155,7 @@ def draw(rows: list[Measured], path: Path) -> None:
             axes.plot(
                 sizes, [row.cell_ms / 1000 for row in own], f"{marker}-", color=colour, label=f"{name}: a view cell"
             )
-            before = [
-                sum(s for phase, s in row.phases.items() if phase not in ("flood", "compile", "write")) for row in own
-            ]
+            before = [sum(row.phases[phase] for phase in BEFORE) for row in own]
             axes.plot(sizes, before, f"{marker}--", color=colour, label=f"{name}: before the first cell")
     axes.set(xscale="log", yscale="log", xlabel="triangles", ylabel="seconds")
     axes.grid(alpha=0.3, which="both")
