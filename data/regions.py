@@ -23,6 +23,8 @@ from .subdivide import PlaneIndex
 LEAST_M2 = 0.5
 # An element thinner than this is also cut through its middle, which serves cells that touch its face.
 THIN_M = 0.6
+# A closed element that is no box is cut only where it is at least so large: round sections break into many rectangles.
+ROUND_M2 = 2.0
 # Steps of the staircase along an oblique outline of a section.
 SECTION_STEPS = 4
 # An oblique section of more triangles than this is left out: it costs more than it hides.
@@ -150,6 +152,9 @@ class _Sections:
         self._boxes = self._boxes.reshape(-1, 2, 3)
         self._solid_box = np.array([_is_box(t) for t in self._triangles], bool)
         self._least = least
+        size = (self._boxes[:, 1] - self._boxes[:, 0]).astype(float)
+        faces = np.stack([size[:, OTHER_AXES[axis]].prod(axis=1) for axis in range(3)], axis=1)
+        self._large = faces >= ROUND_M2 / scene.grid_m**2
         self._middle = self._boxes.sum(axis=1) // 2
         self._heights: dict[tuple[int, int], np.ndarray] = {}
         self._cut: dict[tuple[int, int, int], tuple[np.ndarray, bool]] = {}
@@ -159,7 +164,7 @@ class _Sections:
         """Planes through the middle of thin elements and of those that are no boxes."""
         size = (self._boxes[:, 1] - self._boxes[:, 0]).astype(float)
         wanted = (size[:, OTHER_AXES[axis]].prod(axis=1) >= self._least) & (size[:, axis] > 1)
-        wanted &= (size[:, axis] <= thin) | ~self._solid_box
+        wanted &= np.where(self._solid_box, size[:, axis] <= thin, self._large[:, axis])
         return np.unique(self._middle[wanted, axis])
 
     def rectangles(self, axis: int, k: int) -> np.ndarray:
@@ -168,7 +173,7 @@ class _Sections:
         near = (self._boxes[:, 0, axis] <= k) & (self._boxes[:, 1, axis] >= k)
         simple = near & self._solid_box
         found = [self._boxes[simple][:, :, uv]]
-        for element in np.flatnonzero(near & ~self._solid_box):
+        for element in np.flatnonzero(near & ~self._solid_box & self._large[:, axis]):
             low, high = self._boxes[element, :, axis]
             if low < k:
                 found.append(self._section(int(element), axis, k, below=True))

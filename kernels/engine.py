@@ -29,13 +29,15 @@ from .target import TargetAnswers
 SAMPLE = 24
 # Smaller pieces of furniture hide little and would fill the hierarchy of blockers.
 BLOCKING_DETAIL_M2 = 0.1
-# Oblique surfaces below this hide little.
-PATCH_M2 = 0.1
+# Oblique surfaces below this hide little, and are not made of triangles below the share.
+PATCH_M2 = 1.0
+PATCH_SHARE = 1 / 32
 # View cells and pieces are not halved below this, and a proof has at most so many pieces.
 SMALLEST_M = (0.0625, 0.0625)
-SHAFT_CAP = 2000
-# With certificates, which every halving makes longer.
+SHAFT_CAP = 200
+# With certificates, which shafts alone prove, and which every halving makes longer.
 CERTIFIED_M = (0.25, 0.25)
+CERTIFIED_CAP = 2000
 # With "auto" the occluders are asked about cells of whose potential objects more than this share is unknown.
 AUTO_UNKNOWN = 0.02
 NO_PLANES = OpaquePlanes([np.zeros((0, 2, 3), np.int32)] * 3, 0.0, 0.0)
@@ -401,8 +403,13 @@ def find_occluders(scene: Scene, opaque: OpaquePlanes, *, shadows: bool = True) 
         shadows: whether there are to be any.
     """
     corners, owners = scene.triangles()
-    solid = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners] & shadows
-    patches = find_patches(corners[solid], owners[solid], least_area=PATCH_M2 / scene.grid_m**2)
+    least = PATCH_M2 / scene.grid_m**2
+    solid = np.flatnonzero(scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners] & shadows)
+    # The extent bounds the area, and most triangles of a large model are small ones of furniture and pipes.
+    solid = solid[flat_area(np.ptp(corners[solid], axis=1)) >= PATCH_SHARE * least]
+    edges = (corners[solid, 1:] - corners[solid, :1]).astype(float)
+    solid = solid[np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) >= 2 * PATCH_SHARE * least]
+    patches = find_patches(corners[solid], owners[solid], least_area=least)
     return find_regions(scene, opaque, sections=shadows), patches
 
 

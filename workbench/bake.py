@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 MARGIN_M = 2.0
 # Sources a block: a block is what an interrupted bake resumes from.
 BLOCK = 24
+# Of view cells, whose sets are larger.
+VIEW_BLOCK = 8
 METHODS = ("auto", "portals", "occluders", "both")
 # Models with more triangles than this are not cut into portal cells unless asked.
 PORTAL_TRIANGLES = 3_000_000
@@ -136,7 +138,7 @@ def bake(
     )
     graph = prepared.graph
     facts["budget_spent"] = spent
-    if scene is not None:
+    if scene is not None and not spent:
         facts["counts"] = facts["counts"] | _triangle_counts(scene, graph, object_rows, threads, device)
         clock.lap("back faces")
 
@@ -283,7 +285,7 @@ def default_out(model: Scene | str | Path) -> Path:
 
 def _fingerprint(scene: Scene | None, graph_folder: Path | None, settings: Settings) -> str:
     """Hash of everything that the answer depends on."""
-    digest = hashlib.sha256(f"{__version__} {settings} {BLOCK}".encode())
+    digest = hashlib.sha256(f"{__version__} {settings} {BLOCK} {VIEW_BLOCK}".encode())
     if settings.cells not in ("", "portals", "octree"):
         digest.update(_contents(Path(settings.cells)))
     if scene is None:
@@ -380,7 +382,8 @@ def _visibility(
     engine.compile()
     clock.lap("compile")
     sources = np.flatnonzero(graph.inhabitable)
-    blocks = [sources[i : i + BLOCK] for i in range(0, len(sources), BLOCK)] if scene is not None else [sources]
+    size = VIEW_BLOCK if prepared.view_cells else BLOCK if scene is not None else len(sources)
+    blocks = [sources[i : i + size] for i in range(0, len(sources), size)]
     store = _Store(_partial(out), print_)
     bar = tqdm(total=len(sources), unit="cell", desc="visibility", disable=not progress)
     deadline = np.inf if budget_s is None else time.perf_counter() + budget_s
@@ -453,7 +456,7 @@ def _refine(
                 spent = True
                 break
             # Whole families of about a block.
-            last = min(len(parents), first + max(1, BLOCK // 8))
+            last = min(len(parents), first + max(1, VIEW_BLOCK // 8))
             block = np.arange(ends[first] - alive[first].sum(), ends[last - 1])
             fresh.append(_finish_block(finer, store, f"{level}-{first}", block, bar))
             fresh_cells.append(block)
