@@ -23,7 +23,7 @@ from .subdivide import PlaneIndex
 LEAST_M2 = 0.5
 # An element thinner than this is also cut through its middle, which serves cells that touch its face.
 THIN_M = 0.6
-# A closed element that is no box is cut only where it is at least so large: round sections break into many rectangles.
+# A closed element with oblique faces is cut only where it is so large: its sections break into many rectangles.
 ROUND_M2 = 2.0
 # Steps of the staircase along an oblique outline of a section.
 SECTION_STEPS = 4
@@ -154,7 +154,8 @@ class _Sections:
         self._least = least
         size = (self._boxes[:, 1] - self._boxes[:, 0]).astype(float)
         faces = np.stack([size[:, OTHER_AXES[axis]].prod(axis=1) for axis in range(3)], axis=1)
-        self._large = faces >= ROUND_M2 / scene.grid_m**2
+        straight = np.array([((_normals(t) != 0).sum(axis=1) == 1).all() for t in self._triangles], bool)
+        self._large = (faces >= ROUND_M2 / scene.grid_m**2) | straight[:, None]
         self._middle = self._boxes.sum(axis=1) // 2
         self._heights: dict[tuple[int, int], np.ndarray] = {}
         self._cut: dict[tuple[int, int, int], tuple[np.ndarray, bool]] = {}
