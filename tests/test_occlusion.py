@@ -122,8 +122,16 @@ def test_an_octree_under_a_budget_keeps_what_it_did_not_reach(office, tmp_path):
     settings = Settings(method="occluders", cell_size_m=8.0, depth=1, refine_triangles=1)
     made = bake(office, tmp_path / "tree.bake", settings=settings, budget_s=1e-6)
     assert made.manifest["budget_spent"] and made.potential_objects.all()
+    bake(office, tmp_path / "tree.bake", settings=settings, budget_s=0.4)
     again = bake(office, tmp_path / "tree.bake", settings=settings)
     assert not again.manifest["budget_spent"] and not again.potential_objects.all()
+    whole = bake(office, tmp_path / "whole.bake", settings=settings)
+    assert again.cell_to_object.equals(whole.cell_to_object)
+
+
+def test_a_spent_budget_is_told_without_refinement(office, tmp_path):
+    settings = Settings(method="occluders", cell_size_m=8.0, depth=0)
+    assert bake(office, tmp_path / "tree.bake", settings=settings, budget_s=1e-6).manifest["budget_spent"]
 
 
 def test_a_scene_without_solids_is_baked_with_a_warning(tmp_path, capsys):

@@ -392,7 +392,8 @@ def _visibility(
     else:
         parts, spent = _within(engine, store, blocks, deadline, bar)
     if prepared.view_cells and prepared.facts["inhabitable_because"] == "octree":
-        parts, spent = _refine(prepared, engine, store, parts, settings, deadline, bar)
+        parts, unrefined = _refine(prepared, engine, store, parts, settings, deadline, bar)
+        spent |= unrefined
     bar.close()
     clock.lap("flood")
     tables = {}
@@ -458,7 +459,12 @@ def _refine(
             # Whole families of about a block.
             last = min(len(parents), first + max(1, VIEW_BLOCK // 8))
             block = np.arange(ends[first] - alive[first].sum(), ends[last - 1])
-            fresh.append(_finish_block(finer, store, f"{level}-{first}", block, bar))
+            if not len(block):
+                first = last
+                continue
+            # Which cells come to be refined may depend on the budget: a block is known by its cells, too.
+            held = hashlib.sha256(finer.model.cells[block].tobytes()).hexdigest()[:16]
+            fresh.append(_finish_block(finer, store, f"{level}-{block[0]}-{held}", block, bar))
             fresh_cells.append(block)
             first = last
         place = np.cumsum(~coarse) - 1 + sum(map(len, leaves))
