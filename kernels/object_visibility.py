@@ -6,12 +6,16 @@ sharper.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..data.incidence import Incidence
 from .cell_visibility import CellRows, Model, outside, search_rounds, seeds, segments
 from .sightline import launch_aim
+
+if TYPE_CHECKING:
+    from .occlusion import Occlusion
 
 # Sightlines aimed at each object before anything is proved: most visible objects fall to the first few.
 FIRST_TRIES = 12
@@ -55,9 +59,10 @@ def object_rows(
     rows = ObjectRows(source, target, np.zeros(len(keys), bool), np.zeros((len(keys), 3)), np.zeros((len(keys), 3)))
     cells = model.graph.cells
     everything = np.arange(len(keys))
-    _aim(
+    aim_at_objects(
         model,
-        objects,
+        cells,
+        objects.ranges,
         rows,
         everything,
         cells[source],
@@ -70,7 +75,8 @@ def object_rows(
     for number, tries in enumerate(aim_rounds):
         todo = np.flatnonzero(~rows.seen[hint_pair])
         at = kept_parts[todo]
-        _aim(model, objects, rows, hint_pair[todo], incidence.boxes[at], hints[todo], at, tries, number + 1)
+        boxes = incidence.boxes[at]
+        aim_at_objects(model, cells, objects.ranges, rows, hint_pair[todo], boxes, hints[todo], at, tries, number + 1)
     kept = np.flatnonzero(potential | rows.seen)
     return ObjectRows(source[kept], target[kept], rows.seen[kept], rows.origin[kept], rows.end[kept])
 
@@ -121,9 +127,10 @@ def _prove(
     return potential, hints, parts[kept], pair_of[kept]
 
 
-def _aim(
-    model: Model,
-    objects: ObjectModel,
+def aim_at_objects(
+    model: "Model | Occlusion",
+    cells: np.ndarray,
+    ranges: np.ndarray,
     rows: ObjectRows,
     pairs: np.ndarray,
     boxes: np.ndarray,
@@ -135,8 +142,9 @@ def _aim(
     """Shoot at the objects of the pairs; fills seen, origin and end in place.
 
     Args:
-        model: the model.
-        objects: where objects lie.
+        model: triangles, targets and solids, and how to launch.
+        cells: that the pairs' sources number [grid steps], shape (cells, 2, 3), int32.
+        ranges: first and past-the-last target of each object, shape (objects, 2).
         rows: all pairs.
         pairs: pair of each attempt; a pair may be attempted through several boxes.
         boxes: aim at the part of the object inside this box; ignored in round 0.
@@ -151,11 +159,11 @@ def _aim(
     found, origin, end = launch_aim(
         model.triangles,
         model.targets,
-        model.graph.cells[source],
+        cells[source],
         boxes,
         hints,
         target,
-        objects.ranges[target],
+        ranges[target],
         seeds(model.seed + 101 * (number + 1), source, streams),
         np.full(len(pairs), number > 0),
         tries=tries,

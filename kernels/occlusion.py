@@ -19,10 +19,10 @@ from ..data.occludees import Occludees
 from ..data.patches import Patches
 from ..data.regions import Regions
 from ..data.solids import SolidIndex
-from .cell_visibility import seeds, segments
-from .object_visibility import ObjectRows
+from .cell_visibility import segments
+from .object_visibility import ObjectRows, aim_at_objects
 from .shaft import ShaftAnswers, Shields, device_shields, launch_shaft, patches_met
-from .sightline import AimTargets, Triangles, launch_aim
+from .sightline import AimTargets, Triangles
 from .target import BlockerTree, TargetAnswers, blocker_tree, launch_target_search
 
 # Sightlines aimed at each object that its box does not hide, then at those whose pieces are not hidden, round by round.
@@ -139,7 +139,7 @@ def seen_objects(
     rows = ObjectRows(source, target, np.zeros(count, bool), np.zeros((count, 3)), np.zeros((count, 3)))
     bounds = model.occludees.bounds[target]
     middles = np.stack([model.cells[source].mean(axis=1), bounds.mean(axis=1)], axis=1)
-    _aim(model, rows, np.arange(count), bounds, middles, target, FIRST_TRIES, 0)
+    aim_at_objects(model, model.cells, model.ranges, rows, np.arange(count), bounds, middles, target, FIRST_TRIES, 0)
     return refine_objects(model, rows, aim_rounds, ledger)
 
 
@@ -153,7 +153,9 @@ def refine_objects(
     for number, tries in enumerate(aim_rounds):
         todo = np.flatnonzero(~rows.seen[pairs])
         boxes = model.occludees.pieces[pieces[todo]]
-        _aim(model, rows, pairs[todo], boxes, hints[todo], pieces[todo], tries, number + 1)
+        aim_at_objects(
+            model, model.cells, model.ranges, rows, pairs[todo], boxes, hints[todo], pieces[todo], tries, number + 1
+        )
     kept = np.flatnonzero(potential)
     proofs = None if ledger is None else ledger.close(~potential)
     return ObjectRows(rows.source[kept], rows.target[kept], rows.seen[kept], rows.origin[kept], rows.end[kept]), proofs
@@ -288,40 +290,3 @@ def _certify_boxes(
     failed = answers.verdict != 0
     hints[apart[failed]] = answers.middle[failed]
     return left, hints
-
-
-def _aim(
-    model: Occlusion,
-    rows: ObjectRows,
-    pairs: np.ndarray,
-    boxes: np.ndarray,
-    hints: np.ndarray,
-    streams: np.ndarray,
-    tries: int,
-    number: int,
-) -> None:
-    """Shoot at the objects of the pairs; fills seen, origin and end in place (arguments as in object_visibility)."""
-    if not len(pairs):
-        return
-    source, target = rows.source[pairs], rows.target[pairs]
-    found, origin, end = launch_aim(
-        model.triangles,
-        model.targets,
-        model.cells[source],
-        boxes,
-        hints,
-        target,
-        model.ranges[target],
-        seeds(model.seed + 101 * (number + 1), source, streams),
-        np.full(len(pairs), number > 0),
-        tries=tries,
-        boxed=number > 0,
-        threads=model.threads,
-        device=model.device,
-    )
-    good = np.flatnonzero(found)
-    for cell in np.unique(source[good]):
-        own = good[source[good] == cell]
-        own = own[model.solids.outside(origin[own], int(cell))]
-        rows.seen[pairs[own]] = True
-        rows.origin[pairs[own]], rows.end[pairs[own]] = origin[own], end[own]

@@ -206,10 +206,7 @@ def shrunk_occluders(
     """Projection points and shrunk occluders of a view cell, to look at; arguments as of `vlod_hidden`."""
     method = _Method(occluders, np.asarray(parts, np.int32), settings, VlodStats(), threads, device)
     view = method.prepare(np.asarray(cell)[None])[0]
-    polygons = launch_shrink(view.umbras, view.rows, view.points[view.cluster], None, threads=threads, device=device)
-    sizes = np.diff(polygons.starts)
-    starts = np.concatenate([[0], np.cumsum(sizes[sizes > 0])])
-    return ShrunkOccluders(view.points, polygons.corners, starts, view.cluster[sizes > 0])
+    return method.shrink(view, None)
 
 
 def split_cell(cell: np.ndarray, count: int) -> np.ndarray:
@@ -318,22 +315,29 @@ class _Method:
         limits = distance.max(initial=1) / 2.0 ** np.arange(max(1, self.settings.shells))
         return (distance[:, None] <= limits).sum(axis=1) - 1, limits
 
+    def shrink(self, view: _View, limits: np.ndarray | None) -> ShrunkOccluders:
+        """What is left of a view cell's occluders, for occludees at most `limits` beyond each, or any."""
+        options = {"threads": self.threads, "device": self.device}
+        polygons = launch_shrink(view.umbras, view.rows, view.points[view.cluster], limits, **options)
+        sizes = np.diff(polygons.starts)
+        starts = np.concatenate([[0], np.cumsum(sizes[sizes > 0])])
+        return ShrunkOccluders(view.points, polygons.corners, starts, view.cluster[sizes > 0])
+
     def _covered(self, view: _View, limit: float, boxes: np.ndarray) -> np.ndarray:
         """Whether a cube map of some cluster covers each box, with occluders shrunk for a depth, shape (n,), bool."""
         options = {"threads": self.threads, "device": self.device}
         with self.stats.phase("shrink"):
             limits = np.full(len(view.rows), limit) if self.settings.shells else None
-            polygons = launch_shrink(view.umbras, view.rows, view.points[view.cluster], limits, **options)
-            sizes = np.diff(polygons.starts)
-            left = sizes > 0
-            starts, cluster = np.concatenate([[0], np.cumsum(sizes[left])]), view.cluster[left]
-            self.stats.drawn += len(cluster)
+            shrunk = self.shrink(view, limits)
+            self.stats.drawn += len(shrunk.cluster)
         with self.stats.phase("coverage"):
             resolution = self.settings.resolution
-            maps = launch_coverage(view.points, polygons.corners, starts, cluster, resolution=resolution, **options)
+            maps = launch_coverage(
+                view.points, shrunk.corners, shrunk.starts, shrunk.cluster, resolution=resolution, **options
+            )
         with self.stats.phase("occludees"):
             hidden = np.zeros(len(boxes), bool)
-            for number in np.unique(cluster):
+            for number in np.unique(shrunk.cluster):
                 rest = np.flatnonzero(~hidden)
                 rows = np.column_stack([rest, np.full(len(rest), number)])
                 hidden[rest] = launch_occludees(maps, boxes, rows, threads=self.threads) == 1

@@ -444,33 +444,25 @@ def _refine(
         families = octants(cells[coarse]).reshape(-1, 8, 2, 3)
         alive = walkable(families.reshape(-1, 2, 3), scene, prepared.opaque).reshape(-1, 8)
         parents = np.flatnonzero(coarse)
-        fresh, fresh_cells = [], []
+        fresh, count = [], 0
         finer = engine.with_cells(families[alive].astype(np.int32))
-        ends = np.cumsum(alive.sum(axis=1))
-        bar.total += int(ends[-1]) if len(ends) else 0
+        bar.total += int(alive.sum())
         bar.refresh()
-        first = 0
-        while first < len(parents):
+        for number, size in enumerate(alive.sum(axis=1)):
             if time.perf_counter() > deadline:
                 # What is left of this level stays as it is: unrefined, never hidden.
-                coarse[parents[first:]] = False
+                coarse[parents[number:]] = False
                 spent = True
                 break
-            # Whole families of about a block.
-            last = min(len(parents), first + max(1, VIEW_BLOCK // 8))
-            block = np.arange(ends[first] - alive[first].sum(), ends[last - 1])
-            if not len(block):
-                first = last
-                continue
-            # Which cells come to be refined may depend on the budget: a block is known by its cells, too.
-            held = hashlib.sha256(finer.model.cells[block].tobytes()).hexdigest()[:16]
-            fresh.append(_finish_block(finer, store, f"{level}-{block[0]}-{held}", block, bar))
-            fresh_cells.append(block)
-            first = last
+            block = np.arange(count, count + size)
+            count += int(size)
+            if size:
+                # Which cells come to be refined may depend on the budget: a block is known by its cells, too.
+                held = hashlib.sha256(finer.model.cells[block].tobytes()).hexdigest()[:16]
+                fresh.append(_finish_block(finer, store, f"{level}-{block[0]}-{held}", block, bar))
         place = np.cumsum(~coarse) - 1 + sum(map(len, leaves))
         kept += [relabelled(part, np.where(coarse, -1, place)) for part in parts]
         leaves.append(cells[~coarse])
-        count = int(sum(map(len, fresh_cells)))
         cells, parts = families[alive].astype(np.int32)[:count], fresh
         if not count:
             break
