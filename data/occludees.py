@@ -10,15 +10,13 @@ from hashlib import sha256
 
 import numpy as np
 
-from .hierarchy import median_order
+from .hierarchy import EMPTY, median_order
 from .incidence import CHUNK, clip_bounds
 from .scene import Scene
 
 # Pieces are no smaller than this, and at most PIECES along an axis of their object.
 PIECE_M = 1.0
 PIECES = 4
-# Bounds of a node that holds nothing.
-NOWHERE = 2**25
 
 
 @dataclass
@@ -61,7 +59,7 @@ def _hierarchy(boxes: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
     items = np.full(2**depth, -1, np.int64)
     items[places] = median_order(boxes.sum(axis=1), places, depth)
     bounds = np.empty((2**depth, 2, 3), np.int64)
-    bounds[:, 0], bounds[:, 1] = NOWHERE, -NOWHERE
+    bounds[:, 0], bounds[:, 1] = EMPTY, -EMPTY
     bounds[items >= 0] = boxes[items[items >= 0]]
     levels = [bounds.astype(np.int32)]
     for _ in range(depth):

@@ -22,7 +22,7 @@ from ..data.hierarchy import build_hierarchy
 from ..data.patches import Patches
 from ..data.regions import Regions
 from .launch import SlotSizes, run_sliced, vectors
-from .sightline import real
+from .sightline import nears, real
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -293,25 +293,6 @@ def blocks(shields: Shields, item: int, v_lo: wp.vec3d, v_hi: wp.vec3d, x_lo: wp
 
 
 @wp.func
-def overlaps(p: wp.vec3d, d: wp.vec3d, lo: wp.vec3i, hi: wp.vec3i) -> bool:
-    """Whether the segment p + [0, 1] d comes near a box; steers only."""
-    first = f64(0.0)
-    last = f64(1.0)
-    for i in range(3):
-        low = f64(lo[i]) - NEAR - p[i]
-        high = f64(hi[i]) + NEAR - p[i]
-        if d[i] == f64(0.0):
-            if low > f64(0.0) or high < f64(0.0):
-                last = f64(-1.0)
-        else:
-            t0 = low / d[i]
-            t1 = high / d[i]
-            first = wp.max(first, wp.min(t0, t1))
-            last = wp.min(last, wp.max(t0, t1))
-    return first <= last
-
-
-@wp.func
 def winds(shields: Shields, patch: int, p: wp.vec3d, d: wp.vec3d) -> bool:
     """Whether a line keeps every edge of a loop on one side, in rounded arithmetic; steers only."""
     begin = shields.starts[patch]
@@ -337,7 +318,7 @@ def find_blocker(shields: Shields, v_lo: wp.vec3d, v_hi: wp.vec3d, x_lo: wp.vec3
     count = shields.links.shape[0]
     while node < count:
         link = shields.links[node]
-        if overlaps(p, d, shields.node_lo[node], shields.node_hi[node]):
+        if nears(p, d, real(shields.node_lo[node]), real(shields.node_hi[node]), NEAR):
             if link[1] >= 0:
                 region = shields.region[link[1]]
                 met = 0
@@ -353,7 +334,7 @@ def find_blocker(shields: Shields, v_lo: wp.vec3d, v_hi: wp.vec3d, x_lo: wp.vec3
     count = shields.patch_links.shape[0]
     while node < count:
         link = shields.patch_links[node]
-        if overlaps(p, d, shields.patch_lo[node], shields.patch_hi[node]):
+        if nears(p, d, real(shields.patch_lo[node]), real(shields.patch_hi[node]), NEAR):
             if link[1] >= 0 and winds(shields, link[1], p, d):
                 met = 0
                 if patch_blocks(shields, link[1], v_lo, v_hi, x_lo, x_hi):
@@ -483,7 +464,7 @@ def _meets(
         count = shields.patch_links.shape[0]
         while node < count:
             link = shields.patch_links[node]
-            if overlaps(p, d, shields.patch_lo[node], shields.patch_hi[node]):
+            if nears(p, d, real(shields.patch_lo[node]), real(shields.patch_hi[node]), NEAR):
                 if link[1] >= 0 and winds(shields, link[1], p, d):
                     found = wp.uint8(1)
                     node = count

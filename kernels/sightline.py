@@ -114,6 +114,25 @@ def hits(p: wp.vec3d, q: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> boo
 
 
 @wp.func
+def nears(p: wp.vec3d, d: wp.vec3d, lo: wp.vec3d, hi: wp.vec3d, padding: f64) -> bool:
+    """Whether the segment p + [0, 1] d meets a box that is padded on all sides, in rounded arithmetic."""
+    first = f64(0.0)
+    last = f64(1.0)
+    for i in range(3):
+        low = lo[i] - padding - p[i]
+        high = hi[i] + padding - p[i]
+        if d[i] == f64(0.0):
+            if low > f64(0.0) or high < f64(0.0):
+                last = f64(-1.0)
+        else:
+            t0 = low / d[i]
+            t1 = high / d[i]
+            first = wp.max(first, wp.min(t0, t1))
+            last = wp.min(last, wp.max(t0, t1))
+    return first <= last
+
+
+@wp.func
 def obstacle(scene: Triangles, p: wp.vec3d, q: wp.vec3d, except_owner: int) -> int:
     """A triangle that segment pq does not certainly clear, or -1; those of one object excepted (-1: none)."""
     d = q - p
@@ -121,22 +140,7 @@ def obstacle(scene: Triangles, p: wp.vec3d, q: wp.vec3d, except_owner: int) -> i
     node = int(0)
     while node < count:
         link = scene.links[node]
-        lo = real(scene.node_lo[node])
-        hi = real(scene.node_hi[node])
-        first = f64(0.0)
-        last = f64(1.0)
-        for i in range(3):
-            low = lo[i] - PADDING - p[i]
-            high = hi[i] + PADDING - p[i]
-            if d[i] == f64(0.0):
-                if low > f64(0.0) or high < f64(0.0):
-                    last = f64(-1.0)
-            else:
-                t0 = low / d[i]
-                t1 = high / d[i]
-                first = wp.max(first, wp.min(t0, t1))
-                last = wp.min(last, wp.max(t0, t1))
-        if first <= last:
+        if nears(p, d, real(scene.node_lo[node]), real(scene.node_hi[node]), PADDING):
             item = link[1]
             if item >= 0:
                 if scene.owner[item] != except_owner:
