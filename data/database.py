@@ -210,8 +210,8 @@ def write_bake(
     tables = {
         "meshes": meshes_table(scene or empty),
         "objects": objects_table(scene or empty),
-        "cells": _cells_table(graph, grid_m),
-        "portals": _portals_table(graph, grid_m),
+        "cells": cells_table(graph, grid_m),
+        "portals": portals_table(graph, grid_m),
         "cell_to_object": _cell_to_object_table(object_rows, grid_m),
     }
     if cell_rows is not None:
@@ -226,7 +226,8 @@ def write_bake(
     return Bake(folder, final)
 
 
-def _cells_table(graph: CellGraph, grid_m: float) -> pa.Table:
+def cells_table(graph: CellGraph, grid_m: float) -> pa.Table:
+    """Rows of cells.parquet [m]."""
     values = graph.cells.reshape(-1, 6) * grid_m
     columns = {"cell_id": pa.array(np.arange(graph.cell_count, dtype=np.int32))}
     columns |= {name: pa.array(values[:, i]) for i, name in enumerate(CELL_COLUMNS[1:])}
@@ -235,7 +236,8 @@ def _cells_table(graph: CellGraph, grid_m: float) -> pa.Table:
     return pa.table(columns)
 
 
-def _portals_table(graph: CellGraph, grid_m: float) -> pa.Table:
+def portals_table(graph: CellGraph, grid_m: float) -> pa.Table:
+    """Rows of portals.parquet [m]."""
     rows = np.arange(graph.portal_count)
     uv = OTHER_AXES[graph.portal_axis] if graph.portal_count else np.zeros((0, 2), int)
     metres = graph.portals * grid_m

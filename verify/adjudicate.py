@@ -67,6 +67,37 @@ class Judge:
             return Judgement.LEAK
         return found
 
+    def judge_all(
+        self, kind: str, cells: np.ndarray, targets: np.ndarray, origins: np.ndarray, ends: np.ndarray
+    ) -> np.ndarray:
+        """`judge` of many sightlines of one kind: values of `Judgement`, shape (n,), int8."""
+        found = np.full(len(cells), Judgement.BLOCKED, np.int8)
+        boxes = self.graph.cells[cells]
+        rows = np.flatnonzero(((origins > boxes[:, 0]) & (origins < boxes[:, 1])).all(axis=1))
+        if self.lines is not None and len(rows):
+            rows = rows[self.lines.outside_solids(origins[rows])]
+        if self.lines is None or self.seal_steps:
+            doubtful = np.ones(len(rows), bool)
+        elif kind == "cell":
+            doubtful = np.zeros(len(rows), bool)
+            aims = self.graph.cells[targets[rows]]
+            inside = ((ends[rows] > aims[:, 0]) & (ends[rows] < aims[:, 1])).all(axis=1)
+            sights = self.lines.check(origins[rows], ends[rows])
+            table = np.array([Judgement.VISIBLE, Judgement.GRAZE, Judgement.BLOCKED], np.int8)
+            found[rows] = np.where(inside, table[sights], Judgement.GRAZE)
+        else:
+            own, doubtful = np.zeros(len(rows), bool), np.zeros(len(rows), bool)
+            for triangles, opaque in ((self.lines, True), (self.glass, False)):
+                segments, ids, kinds = triangles.hits(origins[rows], ends[rows])
+                mine = triangles.owners[ids] == targets[rows[segments]]
+                own[segments[mine & (kinds == THROUGH)]] = True
+                # Where something else is met too, the order of the crossings has to be found.
+                doubtful[segments[~mine & opaque]] = True
+            found[rows] = np.where(own, Judgement.VISIBLE, Judgement.GRAZE)
+        for row in rows[doubtful]:
+            found[row] = self.judge(kind, int(cells[row]), int(targets[row]), origins[row], ends[row])
+        return found
+
     def _sees_cell(self, cell: int, target: int, origin: np.ndarray, end: np.ndarray) -> Judgement:
         low, high = self.graph.cells[target]
         if not ((end > low) & (end < high)).all():

@@ -1,0 +1,225 @@
+"""Check anybody's potentially visible sets against a model: hunt for what they hide, and say how sure the answer is.
+
+Where there are triangles, rays look for what the claims hide and every suspect is judged exactly. A bare cell graph
+has no triangles: there, visible means joined by a line through portals, which is decided for every pair.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+from tqdm import tqdm
+
+from ..data.claims import Claims, read_claims
+from ..data.errors import InputError
+from ..data.graph import CellGraph
+from ..data.scene import Role, Scene
+from ..data.scene_folder import read_manifest
+from ..data.view_cells import ViewCells, read_rows, view_cells
+from ..verify.adjudicate import Judge, Judgement, sightline_end
+from ..verify.aims import ORIGINS_MOST, cell_origins
+from ..verify.check_result import CheckResult, WrongPair
+from ..verify.clearance import clearances
+from ..verify.sightline import Sightlines
+from ..verify.walk import contact_links
+
+if TYPE_CHECKING:
+    from ..verify.rays import Candidates
+
+RAYS = 4_000_000
+# Sightlines whose surroundings are measured; it takes about a millisecond each.
+MEASURED = 1_000
+
+
+def check(
+    model: Scene | str | Path,
+    pvs: object,
+    cells: object = None,
+    *,
+    rays: int = RAYS,
+    seed: int = 0,
+    targets: str | None = None,
+    up: str | None = None,
+    unit: str | float | None = None,
+    doors: str = "open",
+    progress: bool = False,
+) -> CheckResult:
+    """Look for visible things that claimed sets hide.
+
+    Args:
+        model: a scene, or a path: whatever `read` takes, a bake folder, or a folder of cells.parquet and
+            portals.parquet, which is judged by its portals.
+        pvs: what is claimed to be potentially visible: a table or matrix as `data.claims.read_claims` takes it, or
+            several in a list.
+        cells: view cells: a table of boxes (a path, or anything that pyarrow makes a table of) in the model's own
+            metres, or a bake folder. By default those of the model, if it is a bake or a cell graph.
+        rays: to cast.
+        seed: of the rays.
+        targets: "objects" or "cells", where a matrix could have either as columns.
+        up: axis that points up in a mesh file, as for `read`.
+        unit: unit of a mesh file, as for `read`.
+        doors: "open" or "closed", as for `read`.
+        progress: show a bar.
+
+    Returns:
+        All wrong-hidden pairs that were found, each with a sightline that exact arithmetic confirms. None found does
+        not mean none there: `CheckResult.confidence` says how much is ruled out.
+
+    Raises:
+        InputError: the model, the cells or the claims are unusable, or a view cell has no point outside every solid.
+    """
+    if rays < 1:
+        raise InputError(f"rays: expected 1 or more, found {rays}")
+    start = time.perf_counter()
+    opened = _open(model, up, unit, doors)
+    if isinstance(opened, CellGraph):
+        from .check_graph import check_graph
+
+        return check_graph(opened, _sources(pvs), str(model), targets)
+    scene, own_cells = opened
+    view = _view_cells(cells if cells is not None else own_cells, scene, str(model))
+    claims = read_claims(_sources(pvs), view, [placed.name for placed in scene.objects], targets)
+    hunt = _Hunt(scene, view, claims, rays, seed)
+    hunt.result.seconds["read"] = time.perf_counter() - start
+    hunt.run(progress)
+    return hunt.result
+
+
+def _sources(pvs: object) -> Sequence[object]:
+    return list(pvs) if isinstance(pvs, list | tuple) else [pvs]
+
+
+def _open(
+    model: Scene | str | Path, up: str | None, unit: str | float | None, doors: str
+) -> tuple[Scene, Path | None] | CellGraph:
+    """The model, and where its own view cells are; or a bare graph."""
+    if isinstance(model, Scene):
+        return model, None
+    path = Path(model)
+    if path.is_dir() and (up or unit or doors != "open"):
+        raise InputError(f"{path}: expected a model file beside up, unit and closed doors, found a folder")
+    if path.is_dir() and not (path / "manifest.json").exists():
+        from ..data.graph_folder import read_graph
+
+        return read_graph(path)[0]
+    if path.is_dir() and read_kind(path) == "bake":
+        from ..data.database import load
+
+        bake = load(path)
+        return bake.graph if bake.scene is None else (bake.scene, path)
+    from ..data.readers import read
+
+    return read(path, up=up, unit=unit, doors=doors), None
+
+
+def read_kind(folder: Path) -> str:
+    """What a folder with a manifest is: "bake", or "scene"."""
+    try:
+        read_manifest(folder, kind="bake")
+    except InputError:
+        return "scene"
+    return "bake"
+
+
+def _view_cells(cells: object, scene: Scene, model: str) -> ViewCells:
+    """View cells of a table; those of a bake are relative to its origin."""
+    if cells is None:
+        raise InputError(f"{model}: expected a table of view cells beside it, found none")
+    if not isinstance(cells, str | Path):
+        try:
+            return view_cells(pa.table(cells), scene, "cells", inwards=True)
+        except (TypeError, AttributeError, pa.ArrowException) as error:
+            raise InputError(f"cells: expected a table, found {error}") from None
+    path = Path(cells)
+    table_path = path / "cells.parquet" if path.is_dir() else path
+    origin = None
+    if (table_path.parent / "manifest.json").is_file() and read_kind(table_path.parent) == "bake":
+        origin = np.array(read_manifest(table_path.parent, kind="bake")["origin"], np.float64)
+    return view_cells(read_rows(table_path), scene, str(table_path), origin=origin, inwards=True)
+
+
+class _Hunt:
+    """One check of claims about a model with triangles."""
+
+    def __init__(self, scene: Scene, view: ViewCells, claims: Claims, rays: int, seed: int):
+        self.rays, self.seed = rays, seed
+        triangles, owners = scene.triangles()
+        opaque = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
+        if not opaque.any():
+            raise InputError(f"{scene.source or 'model'}: expected opaque triangles, found none")
+        self.opaque, self.glass = ((triangles[part], owners[part]) for part in (opaque, ~opaque))
+        lines = Sightlines(*self.opaque)
+        graph = view.graph
+        self.judge = Judge(graph, lines, Sightlines(*self.glass), contact_links(graph.cells))
+        sources = np.flatnonzero(graph.inhabitable)
+        if not len(sources):
+            raise InputError("cells: expected at least one inhabitable view cell, found none")
+        wanted = int(np.clip(rays // len(sources) // 32, 8, ORIGINS_MOST))
+        self.spots = cell_origins(graph, sources, wanted, lines, seed)
+        dark = [int(cell) for cell, own in zip(sources, self.spots, strict=True) if not len(own)]
+        if dark:
+            raise InputError(
+                f"cells: expected view cells with a point outside every solid, found none in cell {view.ids[dark[0]]}"
+                f"{f' and {len(dark) - 1} more' if len(dark) > 1 else ''}; inhabitable = false leaves a cell out"
+            )
+        named = {"object": claims.objects, "cell": claims.cells}
+        claimed = {kind: matrix for kind, matrix in named.items() if matrix is not None}
+        self.result = CheckResult(
+            cell_ids=view.ids,
+            sources=sources,
+            object_names=[placed.name for placed in scene.objects],
+            claimed=claimed,
+            seen={kind: np.zeros_like(matrix) for kind, matrix in claimed.items()},
+            grid_m=scene.grid_m,
+            origin=scene.origin,
+            snap_m=scene.max_snap_m(),
+        )
+        # Pairs that no suspect is wanted of: claimed, or found wrong already.
+        self.settled = {kind: matrix.copy() for kind, matrix in claimed.items()}
+
+    @contextmanager
+    def clock(self, phase: str) -> Iterator[None]:
+        """Add the time spent inside to a phase."""
+        start = time.perf_counter()
+        yield
+        self.result.seconds[phase] = self.result.seconds.get(phase, 0.0) + time.perf_counter() - start
+
+    def run(self, progress: bool) -> None:
+        """Cast, judge, and measure what was found."""
+        with tqdm(total=self.rays, unit="ray", unit_scale=True, disable=not progress) as bar:
+            pass
+        with self.clock("measure"):
+            self.measure()
+
+    def judge_suspects(self, kind: str, suspects: "Candidates") -> np.ndarray:
+        """Judge suspects of one kind; keep the first confirmed one of each pair; say which rows were confirmed."""
+        with self.clock("adjudicate"):
+            result, cells = self.result, self.result.sources[suspects.rows]
+            ends = np.array([sightline_end(suspects, k, self.judge.graph.cells) for k in range(len(cells))])
+            ends = ends.reshape(-1, 3)
+            found = self.judge.judge_all(kind, cells, suspects.targets, suspects.origins, ends)
+            result.grazes += int((found == Judgement.GRAZE).sum())
+            result.blocked += int((found == Judgement.BLOCKED).sum())
+            for k in np.flatnonzero(found == Judgement.VISIBLE):
+                pair = int(cells[k]), int(suspects.targets[k])
+                if not self.settled[kind][pair]:
+                    self.settled[kind][pair] = True
+                    result.wrong.append(WrongPair(kind, *pair, suspects.origins[k], ends[k]))
+            return found == Judgement.VISIBLE
+
+    def measure(self) -> None:
+        """By how much the sightlines of wrong-hidden pairs clear their surroundings."""
+        part = self.result.wrong[:MEASURED]
+        if not part:
+            return
+        origins, ends = np.array([w.origin for w in part]), np.array([w.end for w in part])
+        targets = np.array([w.target if w.kind == "object" else -1 for w in part])
+        distances, objects = clearances(origins, ends, targets, *self.opaque)
+        for k, pair in enumerate(part):
+            near = [(int(o), float(d)) for o, d in zip(objects[k], distances[k], strict=True) if o >= 0]
+            self.result.wrong[k] = replace(pair, margin=float(distances[k, 0]), nearest=tuple(near))
