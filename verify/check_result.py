@@ -47,13 +47,14 @@ class CheckResult:
         seen: the same of pairs that some sightline of this check joined.
         wrong: wrong-hidden pairs.
         exact: whether every pair was decided by exact arithmetic, as in an axial cell graph, and not by sampling.
-        undecided: pairs that the exact decision left open.
+        statement: how sure the answer is, where `confidence` does not apply.
         rays: cast in all.
         uniform: independent random rays of each source, shape (sources,), int.
         grazes: suspects that only touch an edge, a vertex or a boundary.
         blocked: suspects that the exact test stops: Embree had missed a triangle.
         seconds: by phase.
-        grid_m: grid step [m].
+        grid_m: grid step in `unit`.
+        unit: of what is printed.
         origin: what to add to get the model's own place [m], 3 float64.
         snap_m: how far the model's vertices were moved at most [m].
         notes: what the reader of the result should know.
@@ -66,13 +67,14 @@ class CheckResult:
     seen: dict[str, np.ndarray]
     wrong: list[WrongPair] = field(default_factory=list)
     exact: bool = False
-    undecided: int = 0
+    statement: str = ""
     rays: int = 0
     uniform: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     grazes: int = 0
     blocked: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
     grid_m: float = 1.0
+    unit: str = "m"
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
     snap_m: float = 0.0
     notes: list[str] = field(default_factory=list)
@@ -95,12 +97,9 @@ class CheckResult:
 
     def confidence_line(self) -> str:
         """How sure the answer is, in a sentence; it speaks only of a check that found nothing."""
-        if self.exact:
-            left = f"; {self.undecided:,} pairs were left open and count as claimed" if self.undecided else ""
-            return f"exact: every pair of cells was decided by its portals{left}"
         if self.wrong:
             return "none: the claims are refuted"
-        return self.confidence.line()
+        return self.statement or self.confidence.line()
 
     def adjudication_percent(self) -> float:
         """Share of the time that the exact judge took [%]."""
@@ -152,16 +151,21 @@ class CheckResult:
             else f"cell {self.cell_ids[pair.target]}"
         )
         line = (
-            f"cell {self.cell_ids[pair.cell]} sees {target}: from ({', '.join(f'{c:.4f}' for c in start)}) m "
-            f"along ({', '.join(f'{c:.6f}' for c in way / length)}) for {length:.3f} m"
+            f"cell {self.cell_ids[pair.cell]} sees {target}: from ({', '.join(f'{c:.4f}' for c in start)}) "
+            f"along ({', '.join(f'{c:.6f}' for c in way / length)}) for {length:.3f} {self.unit}"
         )
         if pair.portals:
             line += f", through portals {', '.join(map(str, pair.portals))}"
         if pair.margin == pair.margin:
-            line += f", clear of everything by {_length(pair.margin * self.grid_m)}"
-            near = [f"{self.object_names[k]!r} {_length(d * self.grid_m)}" for k, d in pair.nearest]
+            line += f", clear of everything by {self._length(pair.margin)}"
+            near = [f"{self.object_names[k]!r} {self._length(distance)}" for k, distance in pair.nearest]
             line += f" (nearest: {', '.join(near)})" if near else ""
         return line
+
+    def _length(self, steps: float) -> str:
+        """A length as it is printed, small ones in thousandths."""
+        value = steps * self.grid_m
+        return f"{value:.3f} {self.unit}" if value >= 0.1 or self.unit != "m" else f"{1e3 * value:.3g} mm"
 
     def _cells(self, shown: int) -> list[str]:
         lines = []
@@ -179,7 +183,3 @@ class CheckResult:
 
 def _ratio(claimed: int, seen: int) -> str:
     return f"{claimed / seen:.3f}" if seen else "nothing seen" if claimed else "1.000"
-
-
-def _length(metres: float) -> str:
-    return f"{metres:.3f} m" if metres >= 0.1 else f"{1e3 * metres:.3g} mm"

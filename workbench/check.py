@@ -38,7 +38,7 @@ MEASURED = 1_000
 
 def check(
     model: Scene | str | Path,
-    pvs: object,
+    pvs: object = None,
     cells: object = None,
     *,
     rays: int = RAYS,
@@ -76,6 +76,12 @@ def check(
     if rays < 1:
         raise InputError(f"rays: expected 1 or more, found {rays}")
     start = time.perf_counter()
+    if isinstance(model, str | Path) and Path(model).suffix.lower() in (".bsp", ".prt"):
+        from .check_map import check_map
+
+        return check_map(Path(model), _sources(pvs), cells, rays=rays, seed=seed, targets=targets, progress=progress)
+    if pvs is None:
+        raise InputError(f"{model}: expected claims beside it, found none")
     opened = _open(model, up, unit, doors)
     if isinstance(opened, CellGraph):
         from .check_graph import check_graph
@@ -91,7 +97,7 @@ def check(
 
 
 def _sources(pvs: object) -> Sequence[object]:
-    return list(pvs) if isinstance(pvs, list | tuple) else [pvs]
+    return [] if pvs is None else list(pvs) if isinstance(pvs, list | tuple) else [pvs]
 
 
 def _open(

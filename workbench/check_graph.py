@@ -58,7 +58,6 @@ def _compare(graph: CellGraph, claimed: np.ndarray, truth: Bake, seconds: dict[s
     rows = visible_rows(truth.cell_to_cell)
     lines = read_witnesses(rows, "reached_cell_id", truth.grid_m)
     seen[lines.cells, lines.targets] = True
-    undecided = int((potential & ~seen & ~claimed).sum())
     missing = np.flatnonzero(~claimed[lines.cells, lines.targets])
     result = CheckResult(
         cell_ids=np.arange(graph.cell_count),
@@ -67,20 +66,23 @@ def _compare(graph: CellGraph, claimed: np.ndarray, truth: Bake, seconds: dict[s
         claimed={"cell": claimed},
         seen={"cell": seen},
         exact=True,
-        undecided=undecided,
         seconds=seconds,
         grid_m=truth.grid_m,
     )
+    open_ = potential & ~seen & ~claimed
     if len(missing):
         chosen = read_witnesses(rows.take(missing), "reached_cell_id", truth.grid_m)
-        reasons = confirm_cells(chosen, graph, None)
-        for k in np.flatnonzero(reasons == 0):
+        for k, reason in enumerate(confirm_cells(chosen, graph, None)):
             portals = chosen.portals[chosen.starts[k] : chosen.starts[k + 1]]
             line = chosen.origins[k], chosen.ends[k]
             pair = int(chosen.cells[k]), int(chosen.targets[k])
             margin = _margin(*line, graph, portals)
-            result.wrong.append(WrongPair("cell", *pair, *line, tuple(map(int, portals)), margin))
-        result.undecided += int((reasons != 0).sum())
+            if reason:
+                open_[pair] = True
+            else:
+                result.wrong.append(WrongPair("cell", *pair, *line, tuple(map(int, portals)), margin))
+    left = f"; {open_.sum():,} pairs that the claims hide were left open" if open_.any() else ""
+    result.statement = f"exact: every pair of cells was decided by its portals{left}"
     seconds["adjudicate"] = time.perf_counter() - start
     return result
 
