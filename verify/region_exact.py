@@ -13,10 +13,10 @@ lines of measure zero, is HIDDEN. A proof by halving ends only if the relaxed ga
 unrelated edges pass exactly, the search may stop at its limit, UNKNOWN.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import combinations, count
 from math import gcd, lcm
 from typing import NoReturn
 
@@ -24,8 +24,9 @@ import numpy as np
 
 from ..data.errors import InputError
 from ..data.verdict import Verdict
+from .exact import cross, dot, minus
 from .matrix_game import play
-from .shadow_exact import along, cross, dot, minus
+from .shadow_exact import along
 
 Rational = int | float | Fraction
 Point = list[Fraction]
@@ -130,14 +131,15 @@ def cell_faces(cell: Sequence) -> list[list[Point]]:
             raise InputError(f"cell: expected low < high on every axis; found {cell[0]}, {cell[1]}")
         cell = box_faces(*cell)
     faces = [_polygon(face, f"face {k} of the cell") for k, face in enumerate(cell)]
-    corners = [corner for face in faces for corner in face]
-    centre = [sum(c) / len(corners) for c in zip(*corners, strict=True)] if corners else []
-    out, edges = [], set()
+    corners = [point[:3] for point in _homogeneous([corner for face in faces for corner in face])]
+    total, count = [sum(c) for c in zip(*corners, strict=True)], len(corners)
+    out, edges, first = [], set(), 0
     for k, face in enumerate(faces):
-        n, c = _plane(face)
-        if dot(n, centre) > c:
+        n, c = _plane(corners[first : first + len(face)])
+        first += len(face)
+        if dot(n, total) > c * count:
             n, c, face = [-x for x in n], -c, face[::-1]
-        if dot(n, centre) == c or any(dot(n, corner) > c for corner in corners):
+        if dot(n, total) == c * count or any(dot(n, corner) > c for corner in corners):
             raise InputError(f"cell: expected a convex polytope with inside; its face {k} has corners on both sides")
         edges |= {(tuple(a), tuple(b)) for a, b in zip(face, face[1:] + face[:1], strict=True)}
         out.append(face)
@@ -165,10 +167,12 @@ def _polygon(points: Sequence[Sequence[Rational]], name: str) -> list[Point]:
         raise InputError(f"{name}: expected rational coordinates; found {points}") from None
     if len(corners) < 3 or any(len(corner) != 3 for corner in corners):
         raise InputError(f"{name}: expected three or more corners x, y, z; found {points}")
-    n, c = _plane(corners)
-    flat = any(n) and all(dot(n, corner) == c for corner in corners)
-    for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
-        flat = flat and a != b and all(dot(n, cross(minus(b, a), minus(x, a))) >= 0 for x in corners)
+    scaled = [point[:3] for point in _homogeneous(corners)]
+    n, c = _plane(scaled)
+    flat = any(n) and all(dot(n, corner) == c for corner in scaled)
+    for a, b in zip(scaled, scaled[1:] + scaled[:1], strict=True):
+        inwards = cross(n, minus(b, a))
+        flat = flat and a != b and all(dot(inwards, x) >= dot(inwards, a) for x in scaled)
     if not flat:
         raise InputError(f"{name}: expected a planar convex polygon with area; found {points}")
     return corners
@@ -176,9 +180,9 @@ def _polygon(points: Sequence[Sequence[Rational]], name: str) -> list[Point]:
 
 def _plane(corners: Sequence[Point]) -> tuple[Point, Fraction]:
     """(n, c) with n . x = c and n counter-clockwise about the polygon."""
-    n = [Fraction(0)] * 3
+    n = [0] * 3
     for a, b in zip(corners, [*corners[1:], corners[0]], strict=True):
-        n = along(n, Fraction(1), cross(minus(a, corners[0]), minus(b, corners[0])))
+        n = along(n, 1, cross(minus(a, corners[0]), minus(b, corners[0])))
     return n, dot(n, corners[0])
 
 
@@ -344,7 +348,7 @@ class _Search:
             off = next(corner for corner in corners if dot(n, corner) != c)
             eye = along(eye, Fraction(1, 2), minus(off, eye))
         # A plane holds fewer of these points than the polygon has corners: they are the roots of a polynomial.
-        points = (tuple(sum(k**i * p[x] for i, p in enumerate(inside)) for x in range(4)) for k in count(1))
+        points = (tuple(sum(k**i * p[x] for i, p in enumerate(inside)) for x in range(4)) for k in itertools.count(1))
         free = next(t for t in points if all(_at(wall.plane, t) for wall in self.walls.values()))
         end = _cartesian(free)
         self._see(end, minus(eye, end), end)
@@ -437,8 +441,8 @@ def _corner(a: Polygon, b: Polygon, edges: list[Line]) -> tuple[int, int, int] |
     steps = [[t[i] * p[3] - p[i] * t[3] for i in range(3)] for p in a for t in b]
     along = [(e[3], -e[1], e[0]) for e in edges]
     # The product of a dual with a line, and an edge is a line: its dual, rearranged.
-    meet = {(i, j) for i, j in combinations(range(len(edges)), 2) if _side(_undual(edges[i]), edges[j]) == 0}
-    for i, j, k in combinations(range(len(edges)), 3):
+    meet = {(i, j) for i, j in itertools.combinations(range(len(edges)), 2) if _side(_undual(edges[i]), edges[j]) == 0}
+    for i, j, k in itertools.combinations(range(len(edges)), 3):
         if {(i, j), (j, k), (i, k)} <= meet and dot(along[i], cross(along[j], along[k])):
             normals = [cross(along[x], along[y]) for x, y in ((j, k), (k, i), (i, j))]
             weights = [dot(n, step) for n in normals for step in steps]
