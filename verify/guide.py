@@ -20,9 +20,12 @@ Sources: Wonka et al. 2006, "Guided Visibility Sampling" (adaptive border sampli
 from dataclasses import dataclass
 
 import numpy as np
+import warp as wp
 
 from .free_space import FreeSpace
 from .surfaces import Targets, sharp_edges
+
+wp.set_module_options({"enable_backward": False})
 
 STRATEGIES = ("uniform", "aim", "claimed", "near", "gap", "mutate", "hint")
 # Strategies whose stopped rays are tried past the edges of their blockers.
@@ -33,8 +36,10 @@ PATIENCE = 16
 # Claimed pairs whose rays are remembered, and (claimed pair, hidden neighbour) kept for the strategy near.
 REMEMBERED = 1 << 20
 LINKS = 1 << 20
+# Stopped rays of a batch that are kept.
+BLOCKED = 1 << 14
 # Edges of a blocker that are looked at for the one nearest to the ray.
-EDGES = 6
+EDGES = wp.constant(6)
 # How far past an edge a ray goes [grid steps, powers of 10], and how far ends are moved, as shares of the view cell or
 # of the ray's length.
 PAST_EDGE = (-0.5, 2.3)
@@ -43,6 +48,56 @@ MOVES = (-4.0, 0.0)
 INSET = 1e-4
 # A ray is stopped before its target if it goes less far than this.
 SHORT = 0.999
+
+
+@wp.struct
+class EdgeTable:
+    """Edges of objects: those of object k are first[k] to first[k + 1]."""
+
+    first: wp.array[int]
+    starts: wp.array[wp.vec3]
+    ends: wp.array[wp.vec3]
+
+
+@wp.kernel
+def pass_edges(
+    edges: EdgeTable, origins: wp.array[wp.vec3], ends: wp.array[wp.vec3], blockers: wp.array[int],
+    steps: wp.array[float], seed: int, past_out: wp.array[wp.vec3],
+):  # fmt: skip
+    """A point `steps` outside the nearest to each ray of `EDGES` random edges of its blocker; its end without edges."""
+    ray = wp.tid()
+    first = edges.first[blockers[ray]]
+    count = edges.first[blockers[ray] + 1] - first
+    origin = origins[ray]
+    along = wp.normalize(ends[ray] - origin)
+    past = ends[ray]
+    nearest = wp.float32(1.0e30)
+    state = wp.rand_init(seed, ray)
+    for _ in range(wp.where(count > 0, EDGES, 0)):
+        edge = first + wp.randi(state, 0, count)
+        start = edges.starts[edge]
+        side = edges.ends[edge] - start
+        # Both as seen along the ray.
+        across = side - wp.dot(side, along) * along
+        offset = start - origin
+        offset -= wp.dot(offset, along) * along
+        share = wp.clamp(-wp.dot(across, offset) / wp.max(wp.dot(across, across), 1.0e-6), 0.0, 1.0)
+        away = offset + share * across
+        distance = wp.length(away)
+        if distance < nearest:
+            nearest = distance
+            past = start + share * side + steps[ray] * wp.normalize(away)
+    past_out[ray] = past
+
+
+def edge_table(opaque: tuple[np.ndarray, np.ndarray], objects: int) -> EdgeTable:
+    """The edges that may be silhouettes; `surfaces.sharp_edges`."""
+    owners, starts, ends = sharp_edges(*opaque)
+    table = EdgeTable()
+    first = np.searchsorted(owners, np.arange(objects + 1)).astype(np.int32)
+    table.first = wp.array(first, device="cpu", copy=False)
+    table.starts, table.ends = (wp.array(points, dtype=wp.vec3, device="cpu", copy=False) for points in (starts, ends))
+    return table
 
 
 @dataclass(frozen=True)
@@ -84,15 +139,19 @@ class Lesson:
     """What the rays of a batch met.
 
     Attributes:
-        tried: pairs (row * targets + target) that the strategy aim looked at.
-        slots: remembered claimed pairs that were seen, from `origins`, at `ends`.
-        origins: shape (slots, 3), float32.
+        tried: pairs (row * targets + target) that the strategy aim looked at, each once.
+        tries: how often.
+        slots: remembered claimed pairs that were seen, each once.
+        seen: how often.
+        origins: from where last, shape (slots, 3), float32.
         ends: likewise.
         blocked: row, origin, point aimed at, target and blocking object of rays to hidden targets.
     """
 
     tried: np.ndarray
+    tries: np.ndarray
     slots: np.ndarray
+    seen: np.ndarray
     origins: np.ndarray
     ends: np.ndarray
     blocked: tuple[np.ndarray, ...]
@@ -129,8 +188,9 @@ class Guide:
         self._lit = np.flatnonzero(free.lit)
         inset = INSET * (free.high - free.low)
         self._low, self._high = (free.low + inset).astype(np.float32), (free.high - inset).astype(np.float32)
-        owners, self._edge_starts, self._edge_ends = sharp_edges(*opaque)
-        self._edges = np.searchsorted(owners, np.arange(targets.objects + 1))
+        self._edge_table = edge_table(opaque, targets.objects)
+        # Two threads would each compile it.
+        wp.load_module(__name__, device="cpu")
         rng = np.random.default_rng([seed, 0])
         nearest = targets.neighbours(rng)
         self._prior = np.zeros(claimed.shape, np.uint8)
@@ -191,29 +251,27 @@ class Guide:
         met = np.flatnonzero(objects >= 0)
         slots = self._slot[rows[met], objects[met]]
         met, slots = met[slots >= 0], slots[slots >= 0]
+        slots, last, seen = np.unique(slots[::-1], return_index=True, return_counts=True)
+        met = met[::-1][last]
         tried = np.flatnonzero((strategies == STRATEGIES.index("aim")) & (targets >= 0))
         short = reach < SHORT * length(aimed.along)
         retried = np.isin(strategies, [STRATEGIES.index(name) for name in RETRIED])
         stopped = np.flatnonzero(short & (objects >= 0) & (targets >= 0) & retried)
+        stopped = stopped[:: -(-len(stopped) // BLOCKED) or 1]
         return Lesson(
-            rows[tried] * self._targets.count + targets[tried],
+            *np.unique(rows[tried] * self._targets.count + targets[tried], return_counts=True),
             slots,
+            seen,
             starts[met],
             starts[met] + reach[met, None] * directions[met],
-            (
-                rows[stopped],
-                starts[stopped],
-                starts[stopped] + aimed.along[stopped],
-                targets[stopped],
-                objects[stopped],
-            ),
+            tuple(column[stopped] for column in (rows, starts, starts + aimed.along, targets, objects)),
         )
 
     def learn(self, lessons: list[Lesson]) -> None:
         """Take in what the batches of a round met, in their order."""
         for lesson in lessons:
-            np.add.at(self._tries, lesson.tried, 1)
-            np.add.at(self._seen_counts, lesson.slots, 1)
+            self._tries[lesson.tried] += lesson.tries
+            self._seen_counts[lesson.slots] += lesson.seen
             self._seen_origins[lesson.slots], self._seen_ends[lesson.slots] = lesson.origins, lesson.ends
         self._blocked = tuple(np.concatenate(column) for column in zip(*(x.blocked for x in lessons), strict=True))
 
@@ -287,26 +345,14 @@ class Guide:
         self, origins: np.ndarray, ends: np.ndarray, blockers: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
         """A point a little outside the nearest to each ray of some random edges of its blocker."""
-        along = ends - origins
-        along /= np.maximum(length(along), np.float32(1e-6))[:, None]
-        nearest, best = np.full(len(origins), np.inf, np.float32), ends.copy()
-        outward = np.zeros_like(ends)
-        first, count = self._edges[blockers], self._edges[blockers + 1] - self._edges[blockers]
-        for _ in range(EDGES if len(self._edge_starts) else 0):
-            edge = np.minimum(first + (rng.random(len(first)) * count).astype(np.int64), len(self._edge_starts) - 1)
-            start = self._edge_starts[edge]
-            side = self._edge_ends[edge] - start
-            offset = start - origins
-            across = side - dot(side, along)[:, None] * along
-            offset -= dot(offset, along)[:, None] * along
-            share = np.clip(-dot(across, offset) / np.maximum(dot(across, across), np.float32(1e-6)), 0, 1)[:, None]
-            away = offset + share * across
-            distance = length(away)
-            better = (distance < nearest) & (count > 0)
-            nearest[better] = distance[better]
-            best[better] = (start + share * side)[better]
-            outward[better] = (away / np.maximum(distance, np.float32(1e-6))[:, None])[better]
-        return best + (10 ** rng.uniform(*PAST_EDGE, (len(origins), 1))).astype(np.float32) * outward
+        out = np.empty_like(ends)
+        steps = (10 ** rng.uniform(*PAST_EDGE, len(ends))).astype(np.float32)
+        rays = [wp.array(points, dtype=wp.vec3, device="cpu", copy=False) for points in (origins, ends)]
+        inputs = [self._edge_table, *rays, wp.array(blockers.astype(np.int32), device="cpu", copy=False)]
+        inputs += [wp.array(steps, device="cpu", copy=False), int(rng.integers(2**31))]
+        result = wp.array(out, dtype=wp.vec3, device="cpu", copy=False)
+        wp.launch(pass_edges, len(ends), inputs=inputs, outputs=[result], device="cpu")
+        return out
 
     def _toward(self, rows: np.ndarray, origins: np.ndarray, targets: np.ndarray, rng: np.random.Generator) -> Aimed:
         along = self._targets.points(targets, rng) - origins
