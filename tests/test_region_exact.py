@@ -150,7 +150,7 @@ def sampled(random, cell, target, walls, count):
 @pytest.mark.parametrize("kind", SCENES)
 def test_verdicts_have_proofs_and_agree_with_sampled_segments(kind):
     random, found = np.random.default_rng(len(kind)), []
-    for _ in range(40):
+    for _ in range(24):
         target, walls = far_target(random), SCENES[kind](random)
         verdict = check(CELL, target, walls, nodes=2000)
         if sampled(random, CELL, target, walls, 300):
@@ -164,7 +164,7 @@ def test_verdicts_have_proofs_and_agree_with_sampled_segments(kind):
 @pytest.mark.parametrize("kind", SCENES)
 def test_verdicts_have_proofs_and_agree_with_sampled_segments_many(kind):
     random, unknown = np.random.default_rng(100 + len(kind)), 0
-    for _ in range(1000):
+    for _ in range(400):
         target, walls = far_target(random), SCENES[kind](random)
         verdict = check(CELL, target, walls, nodes=2000)
         unknown += verdict is Verdict.UNKNOWN
@@ -182,14 +182,14 @@ def test_sampling_finds_what_the_twin_finds_where_gaps_are_wide():
 
 def test_one_polygon_hides_its_umbra():
     random, found = np.random.default_rng(3), []
-    for _ in range(150):
+    for _ in range(80):
         wall = random_polygon(random, random.integers(-10, 11, 3), random.integers(12, 40))
         target = random_polygon(random, [random.integers(15, 50), *random.integers(-6, 7, 2)], random.integers(1, 4))
         o = occluder(CELL, wall)
         wanted = not o.straddles and all(o.depth(corner) >= 0 and hides(o, corner) for corner in target)
         assert (check(CELL, target, [wall]) is Verdict.HIDDEN) == wanted
         found.append(wanted)
-    assert 10 < sum(found) < 140
+    assert 10 < sum(found) < 70
 
 
 def test_an_umbra_that_ends_at_the_target_hides_it():
@@ -214,7 +214,7 @@ def grid_plates(random):
 
 def test_the_shaft_kernel_hides_nothing_that_is_visible():
     random, agreed = np.random.default_rng(11), {"hidden": 0, "visible": 0}
-    for _ in range(16):
+    for _ in range(12):
         walls, definitions = grid_plates(random), []
         for wall in walls:
             faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
@@ -233,7 +233,7 @@ def test_the_shaft_kernel_hides_nothing_that_is_visible():
             assert verdict != 0 or answer.verdict is not Verdict.VISIBLE, (boxes[0], corners, walls)
             agreed["hidden"] += verdict == 0 and answer.verdict is Verdict.HIDDEN
             agreed["visible"] += verdict != 0 and answer.verdict is Verdict.VISIBLE
-    assert min(agreed.values()) > 10
+    assert min(agreed.values()) > 5
 
 
 def kinds_of(tree):

@@ -157,12 +157,12 @@ def test_verdicts_are_those_of_the_critical_lines(scene):
 
 def test_walls_with_gaps_are_those_of_the_critical_lines():
     random, found = np.random.default_rng(2), []
-    for _ in range(40):
+    for _ in range(16):
         cell, target, walls = wall_scene(random)
         wanted = visible_by_critical_lines(cell_corners(cell), target, walls)
         assert (check(cell, target, walls) is Verdict.VISIBLE) == wanted, (target, walls)
         found.append(wanted)
-    assert 10 < sum(found) < 30
+    assert 3 < sum(found) < 13
 
 
 @pytest.mark.slow
