@@ -5,12 +5,14 @@ b of the target beyond its plane are searched. An occluder that has a and b on o
 exactly if the line passes outside one of its edges, side(p, t, edge) > 0: branch on the edge; if a or b straddles its
 plane, cut it there first. side is affine in p and in t, so on a x b it lies in the hull of its values at the pairs of
 corners: a matrix game whose value is <= 0 refutes the chosen edges (Farkas' lemma in Pluecker space, where Haumont et
-al. 2005, "Exact polygon-to-polygon visibility", subtract polytopes). If its value is positive, the strategy proposes a
-line; with p fixed all conditions are linear in t, which repairs it. Where no line is found, a or b is halved.
+al. 2005, "A low dimensional framework for exact polygon-to-polygon occlusion queries", subtract polytopes). If its
+value is positive, the strategy proposes a line; with p fixed all conditions are linear in t, which repairs it. Where no
+line is found, a or b is halved.
 
 Cells are open, occluders closed, the end lies inside the target: what is seen only along occluder borders, a set of
-lines of measure zero, is HIDDEN. A proof by halving ends only if the relaxed game does: where lines that graze three
-unrelated edges pass exactly, the search may stop at its limit, UNKNOWN.
+lines of measure zero, is HIDDEN. The search stops at its limit, UNKNOWN, where no piece around a line that grazes
+several edges, however small, can be refuted. Three edges that meet in a point, as those of a box's corner, are refuted
+without halving (`corner` in `region_certificate`).
 """
 
 import itertools
@@ -48,7 +50,7 @@ class RegionAnswer:
     """Answer to one from-region question.
 
     Attributes:
-        verdict: VISIBLE, HIDDEN, or UNKNOWN at the limit of nodes.
+        verdict: VISIBLE, HIDDEN, or UNKNOWN at a limit of the search.
         start: of a witness segment, strictly inside the cell, exact; None unless VISIBLE.
         end: of it, in the relative interior of the target. The closed segment meets no occluder, those in the target's
             plane apart.
@@ -64,11 +66,11 @@ class RegionAnswer:
 
 
 class _Seen(Exception):
-    """A segment was found: p on a face of the cell, t on the target."""
+    """A segment was found, from (start) to (end)."""
 
 
 class _Spent(Exception):
-    """The limit of nodes was reached."""
+    """The limit of nodes or of halvings was reached."""
 
 
 def box_faces(low: Sequence[Rational], high: Sequence[Rational]) -> list[list[list[Rational]]]:
@@ -95,10 +97,10 @@ def region_visible(
         cell: (low, high) of a box, or the faces of a convex polytope; with inside.
         target: a planar convex polygon, or faces, of which one is to be seen (of a convex polytope, say).
         occluders: planar convex polygons, closed. One in the target's own plane hides nothing of it.
-        nodes: limit of the search.
+        nodes: limit of the search; pieces of faces and target are halved 64 times at most besides.
 
     Returns:
-        VISIBLE with a rational segment, HIDDEN with a certificate, never wrong; UNKNOWN only at the limit.
+        VISIBLE with a rational segment, HIDDEN with a certificate, never wrong; UNKNOWN only at a limit.
 
     Raises:
         InputError: a polygon is not planar and convex with area, or the cell is no convex polytope with inside.
@@ -311,7 +313,7 @@ class _Search:
 
         Raises:
             _Seen: the target is visible along (start, end).
-            _Spent: at the limit of nodes.
+            _Spent: at a limit.
         """
         self.target = _integer_plane(*_plane([_cartesian(t) for t in target]))
         self.walls = {
@@ -439,12 +441,11 @@ def _propose(a: Polygon, b: Polygon, edges: list[Line]) -> tuple[list[int] | Non
 def _corner(a: Polygon, b: Polygon, edges: list[Line]) -> tuple[int, int, int] | None:
     """Three edges on lines through one point, outside all of which no line from a to b passes."""
     steps = [[t[i] * p[3] - p[i] * t[3] for i in range(3)] for p in a for t in b]
-    along = [(e[3], -e[1], e[0]) for e in edges]
-    # The product of a dual with a line, and an edge is a line: its dual, rearranged.
+    ways = [(e[3], -e[1], e[0]) for e in edges]
     meet = {(i, j) for i, j in itertools.combinations(range(len(edges)), 2) if _side(_undual(edges[i]), edges[j]) == 0}
     for i, j, k in itertools.combinations(range(len(edges)), 3):
-        if {(i, j), (j, k), (i, k)} <= meet and dot(along[i], cross(along[j], along[k])):
-            normals = [cross(along[x], along[y]) for x, y in ((j, k), (k, i), (i, j))]
+        if {(i, j), (j, k), (i, k)} <= meet and dot(ways[i], cross(ways[j], ways[k])):
+            normals = [cross(ways[x], ways[y]) for x, y in ((j, k), (k, i), (i, j))]
             weights = [dot(n, step) for n in normals for step in steps]
             if min(weights) >= 0 or max(weights) <= 0:
                 return i, j, k
