@@ -41,7 +41,7 @@ class FreeSpace:
         low, high = low[order], high[order]
         states = [self._classify(row, low, high) for row in range(len(boxes))]
         self.state = np.stack(states) if states else np.zeros((0, *(RESOLUTION,) * 3), np.uint8)
-        self.lit = (self.state != SOLID).reshape(len(boxes), -1).any(axis=1) | (self._counts > 0)
+        self.lit = (self.state != SOLID).any(axis=(1, 2, 3)) | (self._counts > 0)
 
     def _classify(self, row: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         start, size = self.low[row], self.high[row] - self.low[row]
