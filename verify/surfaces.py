@@ -10,6 +10,8 @@ BY_AREA = 64
 # Points of each target by which neighbours are found, and the nearest points looked at.
 SAMPLES, NEAREST = 16, 96
 NEIGHBOURS = 16
+# Targets whose neighbours are looked for together.
+CHUNK = 1 << 10
 # Normals whose cosine is above this make a flat edge.
 FLAT = 1 - 1e-9
 # Odd multipliers that mix coordinates and ids (Steele et al. 2014, "Fast Splittable Pseudorandom Number Generators").
@@ -73,23 +75,28 @@ class Targets:
         """The nearest other targets of each by random points of them, shape (count, 16), int32; -1 for none."""
         ids = np.repeat(np.flatnonzero(self.present), SAMPLES)
         out = np.full((self.count, NEIGHBOURS), -1, np.int32)
-        if not len(ids):
-            return out
-        points = self.points(ids, rng)
-        distance, place = cKDTree(points).query(points, k=np.arange(1, min(NEAREST, len(points)) + 1), workers=2)
-        here, there, distance = np.repeat(ids, place.shape[1]), ids[place].ravel(), distance.ravel()
-        keep = here != there
-        here, there, distance = here[keep], there[keep], distance[keep]
-        order = np.lexsort((distance, there, here))
-        here, there, distance = here[order], there[order], distance[order]
-        nearest = np.flatnonzero((np.diff(here, prepend=-1) != 0) | (np.diff(there, prepend=-1) != 0))
-        here, there, distance = here[nearest], there[nearest], distance[nearest]
-        order = np.lexsort((distance, here))
-        here, there = here[order], there[order]
-        rank = np.arange(len(here)) - np.searchsorted(here, here)
-        kept = rank < NEIGHBOURS
-        out[here[kept], rank[kept]] = there[kept]
+        if len(ids):
+            points = self.points(ids, rng)
+            tree = cKDTree(points)
+            for first in range(0, len(ids), CHUNK * SAMPLES):
+                part = slice(first, first + CHUNK * SAMPLES)
+                distance, place = tree.query(points[part], k=np.arange(1, min(NEAREST, len(points)) + 1), workers=2)
+                keep_nearest(np.repeat(ids[part], place.shape[1]), ids[place].ravel(), distance.ravel(), out)
         return out
+
+
+def keep_nearest(here: np.ndarray, there: np.ndarray, distance: np.ndarray, out: np.ndarray) -> None:
+    """Write the targets nearest to each of `here`, itself excepted, into its row of `out`, the nearest first."""
+    apart = here != there
+    here, there, distance = here[apart], there[apart], distance[apart]
+    order = np.lexsort((distance, there, here))
+    here, there, distance = here[order], there[order], distance[order]
+    first = np.flatnonzero((np.diff(here, prepend=-1) != 0) | (np.diff(there, prepend=-1) != 0))
+    order = first[np.lexsort((distance[first], here[first]))]
+    here, there = here[order], there[order]
+    rank = np.arange(len(here)) - np.searchsorted(here, here)
+    kept = rank < out.shape[1]
+    out[here[kept], rank[kept]] = there[kept]
 
 
 def sharp_edges(triangles: np.ndarray, owners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
