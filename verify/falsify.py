@@ -18,7 +18,7 @@ from .rays import Candidates, embree_scene
 from .sightline import Sightlines
 from .surfaces import Targets
 
-SHARES = {"uniform": 0.25, "aim": 0.2, "claimed": 0.05, "near": 0.25, "gap": 0.18, "mutate": 0.07}
+SHARES = {"uniform": 0.25, "aim": 0.22, "near": 0.25, "gap": 0.2, "mutate": 0.08}
 # Of all rays if there are hints; the others give way in proportion, the uniform ones excepted.
 HINT_SHARE = 0.1
 # Batches between two looks at what was learnt, for any number of threads; rays of the first and of the largest.

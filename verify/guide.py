@@ -6,7 +6,6 @@ Every ray serves one strategy. What guides them is the claim and what earlier ra
   these bound what is missed; `falsify.missed_solid_angle`.
 - aim: from a free point at a point of a hidden target. A pair is as likely as the square of how many of the target's
   16 nearest targets the view cell claims to see, and less so the oftener it was tried.
-- claimed: at what is claimed visible, so that the others learn where to look.
 - near: from where a ray has seen a claimed object, at a hidden target near that object. Seldom seen objects come first:
   they are seen through gaps.
 - gap: a ray that a hidden target's blocker has stopped, moved to just past an edge of the blocker.
@@ -27,7 +26,7 @@ from .surfaces import Targets, sharp_edges
 
 wp.set_module_options({"enable_backward": False})
 
-STRATEGIES = ("uniform", "aim", "claimed", "near", "gap", "mutate", "hint")
+STRATEGIES = ("uniform", "aim", "near", "gap", "mutate", "hint")
 # Strategies whose stopped rays are tried past the edges of their blockers.
 RETRIED = ("aim", "near", "gap")
 # Weight of a pair without claimed neighbours, and the tries after which a pair counts half.
@@ -225,7 +224,6 @@ class Guide:
     def weigh_seen(self) -> None:
         """Weights of what was seen, by how seldom it was; before batches are cast."""
         rare = 1 / (1 + self._seen_counts)
-        self._claimed_sums = np.cumsum(rare)
         rare[self._seen_counts == 0] = 0
         self._seen_sums = np.cumsum(rare)
         self._link_sums = np.cumsum(rare[self._link_slots])
@@ -288,15 +286,6 @@ class Guide:
             return None
         rows, targets = np.divmod(pairs, self._targets.count)
         return self._toward(rows, self._free.draw(rows, rng)[0], targets, rng)
-
-    def _claimed(self, count: int, rng: np.random.Generator) -> Aimed | None:
-        slots = _choose(self._claimed_sums, count, rng)
-        if slots is None:
-            return None
-        rows = self._seen_rows[slots]
-        aimed = self._toward(rows, self._free.draw(rows, rng)[0], self._seen_targets[slots], rng)
-        aimed.targets[:] = -1
-        return aimed
 
     def _near(self, count: int, rng: np.random.Generator) -> Aimed | None:
         links = _choose(self._link_sums, count, rng)
