@@ -348,6 +348,16 @@ def test_the_limit_of_nodes_is_told():
     assert answer.verdict is Verdict.UNKNOWN and answer.certificate is None and answer.start is None
 
 
+def test_what_halving_leaves_open_is_not_called_hidden():
+    """Edges of two boxes in the plane of a face of the cell: lines in that plane graze three of them."""
+    target = [[45, Fraction(-48, 17), Fraction(-165, 17)], [Fraction(95, 2), Fraction(37, 34), Fraction(-847, 136)]]
+    target += [[Fraction(109, 2), Fraction(-257, 34), Fraction(-189, 136)]]
+    target += [[Fraction(105, 2), Fraction(-309, 34), Fraction(-513, 136)]]
+    boxes = [([-1, -10, -12], [7, -6, 12]), ([-6, -6, -10], [-3, 5, 10]), ([-1, 5, -9], [5, 17, 9])]
+    walls = [face for low, high in boxes for face in box_faces(low, high)]
+    assert check(CELL, target, walls, nodes=300) is not Verdict.VISIBLE
+
+
 def altered(tree):
     """Every tree with one leaf replaced by nothing or by equal weights, or one branch's children reversed."""
     if not isinstance(tree, tuple) or not tree:

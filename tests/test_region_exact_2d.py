@@ -200,6 +200,8 @@ def test_contacts():
     assert check(cell, target, [[(10, -9), (10, 9)]]) is Verdict.VISIBLE
     assert check(cell, target, [[(-8, -9), (-8, 9)]]) is Verdict.HIDDEN
     assert check(cell, target, [[(-9, -9), (-9, 9)]]) is Verdict.VISIBLE
+    # The end of an occluder inside the cell lies on the way to the middle of the target.
+    assert check(cell, target, [[(Fraction(-17, 2), 0), (Fraction(-17, 2), 5)]]) is Verdict.VISIBLE
     # Staggered: each alone leaves a view, together they leave only the one slanted line through both ends.
     assert check(cell, target, [[(-2, -9), (-2, 0)], [(2, 0), (2, 9)]]) is Verdict.VISIBLE
     assert check(cell, [(10, 3), (10, 4)], [[(-2, -9), (-2, 0)], [(2, 0), (2, 9)]]) is Verdict.HIDDEN
