@@ -47,7 +47,8 @@ class FreeSpace:
         start, size = self.low[row], self.high[row] - self.low[row]
         near = np.searchsorted(low[:, 0], self.high[row, 0], "right")
         met = np.flatnonzero(high[:near, 0] >= start[0])
-        met = met[(low[met, 1:] <= self.high[row, 1:]).all(axis=1) & (high[met, 1:] >= start[1:]).all(axis=1)]
+        for axis in (1, 2):
+            met = met[(low[met, axis] <= self.high[row, axis]) & (high[met, axis] >= start[axis])]
         places = ((bound[met] - start) / size * RESOLUTION for bound in (low, high))
         first, last = (
             np.clip(np.floor(place + pad), 0, RESOLUTION - 1).astype(int)

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 # Triangles of an object that are drawn from, beside each once: by area.
 BY_AREA = 64
 # Points of each target by which neighbours are found, and the nearest points looked at.
-SAMPLES, NEAREST = 16, 96
+SAMPLES, NEAREST = 16, 48
 NEIGHBOURS = 16
 # Targets whose neighbours are looked for together.
 CHUNK = 1 << 10
@@ -72,7 +72,7 @@ class Targets:
         return out
 
     def neighbours(self, rng: np.random.Generator) -> np.ndarray:
-        """The nearest other targets of each by random points of them, shape (count, 16), int32; -1 for none."""
+        """Nearest other targets of each, the nearest first, shape (count, 16), int32; -1 where the 48 nearest points end."""
         ids = np.repeat(np.flatnonzero(self.present), SAMPLES)
         out = np.full((self.count, NEIGHBOURS), -1, np.int32)
         if len(ids):
@@ -87,13 +87,13 @@ class Targets:
 
 def keep_nearest(here: np.ndarray, there: np.ndarray, distance: np.ndarray, out: np.ndarray) -> None:
     """Write the targets nearest to each of `here`, itself excepted, into its row of `out`, the nearest first."""
-    apart = here != there
-    here, there, distance = here[apart], there[apart], distance[apart]
-    order = np.lexsort((distance, there, here))
-    here, there, distance = here[order], there[order], distance[order]
-    first = np.flatnonzero((np.diff(here, prepend=-1) != 0) | (np.diff(there, prepend=-1) != 0))
-    order = first[np.lexsort((distance[first], here[first]))]
-    here, there = here[order], there[order]
+    keys = here * np.int64(len(out)) + there
+    order = np.argsort(distance)
+    order = order[(here != there)[order]]
+    # The first of a pair is its nearest.
+    first = np.sort(np.unique(keys[order], return_index=True)[1])
+    pairs = order[first[np.argsort(here[order[first]], kind="stable")]]
+    here, there = here[pairs], there[pairs]
     rank = np.arange(len(here)) - np.searchsorted(here, here)
     kept = rank < out.shape[1]
     out[here[kept], rank[kept]] = there[kept]
