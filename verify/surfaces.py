@@ -72,7 +72,7 @@ class Targets:
         return out
 
     def neighbours(self, rng: np.random.Generator) -> np.ndarray:
-        """Nearest other targets of each, the nearest first, shape (count, 16), int32; -1 where the 48 nearest points end."""
+        """Nearest other targets of each, shape (count, 16), int32; -1 where the 48 nearest points have no more."""
         ids = np.repeat(np.flatnonzero(self.present), SAMPLES)
         out = np.full((self.count, NEIGHBOURS), -1, np.int32)
         if len(ids):
