@@ -12,7 +12,9 @@ _HOME = {
     "InputError": "viewcell.data.errors",
     "Scene": "viewcell.data.scene",
     "Verdict": "viewcell.data.verdict",
+    "assert_conservative": "viewcell.workbench.check",
     "bake": "viewcell.workbench.bake",
+    "check": "viewcell.workbench.check",
     "load": "viewcell.data.database",
     "make_office": "viewcell.data.buildings.office",
     "read": "viewcell.data.readers",
@@ -20,7 +22,20 @@ _HOME = {
     "verify": "viewcell.workbench.verify",
 }
 
-__all__ = ["Bake", "InputError", "Scene", "Verdict", "bake", "load", "make_office", "read", "report", "verify"]
+__all__ = [
+    "Bake",
+    "InputError",
+    "Scene",
+    "Verdict",
+    "assert_conservative",
+    "bake",
+    "check",
+    "load",
+    "make_office",
+    "read",
+    "report",
+    "verify",
+]
 
 
 def __getattr__(name: str) -> object:

@@ -128,6 +128,8 @@ def _from_table(table: pa.Table, view: ViewCells, object_names: Sequence[str], w
         columns = ", ".join(table.column_names) or "no column"
         raise InputError(f"{where}: expected the columns cell_id and object_id or reached_cell_id, found {columns}")
     kind = found[0]
+    if kind == "object" and not object_names:
+        raise InputError(f"{where}: expected claims of cells for a model without objects, found claims of objects")
     cell_names = [str(name) for name in view.graph.cell_names]
     sources = _places(table["cell_id"], view.ids, cell_names, "cell", where)
     if kind == "object":

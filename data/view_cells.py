@@ -101,7 +101,8 @@ def view_cells(
         raise InputError(
             f"{where}: expected view cells near the model, found a coordinate of {np.abs(boxes).max():g} m"
         )
-    cells = np.stack([np.floor(steps[:, 0]), np.ceil(steps[:, 1])], axis=1).astype(np.int64)
+    down, up = (np.ceil, np.floor) if inwards else (np.floor, np.ceil)
+    cells = np.stack([down(steps[:, 0]), up(steps[:, 1])], axis=1).astype(np.int64)
     ids = _cell_ids(table, where)
     flat = np.flatnonzero(((boxes[:, 1] <= boxes[:, 0]) | (cells[:, 1] <= cells[:, 0])).any(axis=1))
     if len(flat):

@@ -58,6 +58,8 @@ class CheckResult:
         origin: what to add to get the model's own place [m], 3 float64.
         snap_m: how far the model's vertices were moved at most [m].
         notes: what the reader of the result should know.
+        asked: the model's path and how to read it; what a replay needs.
+        boxes: of the view cells [grid steps], shape (cells, 2, 3).
     """
 
     cell_ids: np.ndarray
@@ -78,6 +80,8 @@ class CheckResult:
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
     snap_m: float = 0.0
     notes: list[str] = field(default_factory=list)
+    asked: dict[str, object] = field(default_factory=dict)
+    boxes: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3), np.int32))
 
     @property
     def ok(self) -> bool:

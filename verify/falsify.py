@@ -74,6 +74,8 @@ class Falsifier:
     Attributes:
         lit: view cells that have a free point, shape (rows,), bool; no ray starts in the others.
         uniform_rays: independent uniform rays cast from each view cell, shape (rows,), int64.
+        free: where rays start.
+        targets: where they are aimed.
     """
 
     def __init__(
@@ -126,17 +128,21 @@ class Falsifier:
         self._seed, self._threads = seed, threads
         self._owners = np.append(opaque[1], -1).astype(np.int64)
         self._scene = embree_scene(opaque[0])
-        self._free = FreeSpace(boxes, spots, lines or Sightlines(*opaque))
+        self.free = FreeSpace(boxes, spots, lines or Sightlines(*opaque))
         triangles, owners = (np.concatenate(pair) for pair in zip(opaque, glass, strict=True))
-        self._targets = Targets(triangles, owners, objects, cells)
+        self.targets = Targets(triangles, owners, objects, cells)
         self._guide = Guide(
-            self._free, self._targets, np.concatenate([claimed, claimed_cells], axis=1), opaque, hints, seed
+            self.free, self.targets, np.concatenate([claimed, claimed_cells], axis=1), opaque, hints, seed
         )
         shown = self._guide.hidden[:, :objects].any(axis=0)[glass[1]]
         self._glass_owners = glass[1][shown].astype(np.int64)
         self._glass_scene = embree_scene(glass[0][shown])
         self._attempts = np.zeros(self._guide.hidden.size, np.uint8)
-        self.lit, self.uniform_rays = self._free.lit, np.zeros(rows, np.int64)
+        self.lit, self.uniform_rays = self.free.lit, np.zeros(rows, np.int64)
+
+    def seen(self) -> np.ndarray:
+        """Claimed pairs that a ray has seen so far, shape (rows, objects + cells), bool; cells only if aimed at."""
+        return self._guide.seen()
 
     def batches(self, rays: int) -> Iterator[tuple[Candidates, Progress]]:
         """Cast rays in rounds; stop whenever enough is known.
@@ -194,7 +200,7 @@ class Falsifier:
         kept = []
         for own, _, fresh, _ in results:
             self.uniform_rays += np.bincount(fresh, minlength=len(self.uniform_rays))
-            keys = own.rows * self._targets.count + own.targets + self._targets.objects * (own.kinds == 0)
+            keys = own.rows * self.targets.count + own.targets + self.targets.objects * (own.kinds == 0)
             allowed = self._attempts[keys] < ATTEMPTS
             self._attempts[keys[allowed]] += 1
             kept.append([column[allowed] for column in vars(own).values()])
@@ -215,22 +221,22 @@ class Falsifier:
         entered = self._entered(aimed, directions, reach)
         shown.append((entered, aimed.targets[entered], reach[entered]))
         ray, target, far = (np.concatenate(column) for column in zip(*shown, strict=True))
-        keys = aimed.rows[ray] * self._targets.count + target
+        keys = aimed.rows[ray] * self.targets.count + target
         wrong = np.flatnonzero(self._guide.hidden.ravel()[keys] & (self._attempts[keys] < ATTEMPTS))
         wrong = wrong[np.unique(keys[wrong], return_index=True)[1]]
         rows, starts = aimed.rows[ray[wrong]], aimed.origins[ray[wrong]].astype(np.float64)
-        good = all_axes((starts > self._free.low[rows]) & (starts < self._free.high[rows]))
-        good &= self._free.lines.outside_solids(starts)
+        good = all_axes((starts > self.free.low[rows]) & (starts < self.free.high[rows]))
+        good &= self.free.lines.outside_solids(starts)
         rows, starts, wrong = rows[good], starts[good], wrong[good]
-        is_object = target[wrong] < self._targets.objects
-        targets = np.where(is_object, target[wrong], target[wrong] - self._targets.objects)
+        is_object = target[wrong] < self.targets.objects
+        targets = np.where(is_object, target[wrong], target[wrong] - self.targets.objects)
         along = directions[ray[wrong]].astype(np.float64)
         return Candidates(rows, is_object.astype(np.int64), targets, starts, along, far[wrong].astype(np.float64))
 
     def _entered(self, aimed: Aimed, directions: np.ndarray, reach: np.ndarray) -> np.ndarray:
         """The rays that enter the cell they are aimed at before they are stopped."""
-        rays = np.flatnonzero(aimed.targets >= self._targets.objects)
-        low, high = self._targets.cells[aimed.targets[rays] - self._targets.objects].transpose(1, 0, 2)
+        rays = np.flatnonzero(aimed.targets >= self.targets.objects)
+        low, high = self.targets.cells[aimed.targets[rays] - self.targets.objects].transpose(1, 0, 2)
         with np.errstate(divide="ignore", invalid="ignore"):
             enter, leave = slab(aimed.origins[rays], directions[rays], low, high)
         return rays[enter < np.float32(SHORT) * np.fmin(leave, reach[rays])]

@@ -214,6 +214,12 @@ class Guide:
         kept = np.sort(rng.permutation(len(slots))[:LINKS])
         self._link_slots, self._link_targets = slots[kept], beside[slots[kept], places[kept]].astype(np.int64)
 
+    def seen(self) -> np.ndarray:
+        """Claimed pairs that a ray has seen, of those that are remembered, shape (rows, targets), bool."""
+        found, known = np.zeros(self.hidden.shape, bool), self._seen_counts > 0
+        found[self._seen_rows[known], self._seen_targets[known]] = True
+        return found
+
     def weigh_pairs(self, settled: np.ndarray) -> None:
         """Weights of the hidden pairs by how often they were tried; `settled`, shape (rows * targets,), get none."""
         weights = np.square(self._prior, dtype=np.float32).ravel() + np.float32(FLOOR)

@@ -5,11 +5,9 @@ has no triangles: there, visible means joined by a line through portals, which i
 """
 
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -22,18 +20,21 @@ from ..data.scene import Role, Scene
 from ..data.scene_folder import read_manifest
 from ..data.view_cells import ViewCells, read_rows, view_cells
 from ..verify.adjudicate import Judge, Judgement, sightline_end
+from ..verify.again import SecondLook
 from ..verify.aims import ORIGINS_MOST, cell_origins
 from ..verify.check_result import CheckResult, WrongPair
 from ..verify.clearance import clearances
+from ..verify.confidence import Confidence
+from ..verify.falsify import Falsifier
+from ..verify.rays import Candidates
 from ..verify.sightline import Sightlines
 from ..verify.walk import contact_links
-
-if TYPE_CHECKING:
-    from ..verify.rays import Candidates
 
 RAYS = 4_000_000
 # Sightlines whose surroundings are measured; it takes about a millisecond each.
 MEASURED = 1_000
+# Rays to each claimed pair that the hunt did not see.
+AGAIN = 512
 
 
 def check(
@@ -82,28 +83,66 @@ def check(
         return check_map(Path(model), _sources(pvs), cells, rays=rays, seed=seed, targets=targets, progress=progress)
     if pvs is None:
         raise InputError(f"{model}: expected claims beside it, found none")
-    opened = _open(model, up, unit, doors)
+    opened = open_model(model, up, unit, doors)
     if isinstance(opened, CellGraph):
         from .check_graph import check_graph
 
-        return check_graph(opened, _sources(pvs), str(model), targets)
+        result = check_graph(opened, _sources(pvs), targets)
+        result.asked = {"model": str(Path(model).resolve()), "judge": "portals"}
+        return result
     scene, own_cells = opened
     view = _view_cells(cells if cells is not None else own_cells, scene, str(model))
     claims = read_claims(_sources(pvs), view, [placed.name for placed in scene.objects], targets)
     hunt = _Hunt(scene, view, claims, rays, seed)
     hunt.result.seconds["read"] = time.perf_counter() - start
     hunt.run(progress)
+    path = None if isinstance(model, Scene) else str(Path(model).resolve())
+    hunt.result.asked = {"model": path, "judge": "triangles", "up": up, "unit": unit, "doors": doors}
     return hunt.result
+
+
+def assert_conservative(
+    pvs: object, scene: Scene | str | Path, cells: object = None, *, rays: int = 1_000_000, **options: object
+) -> CheckResult:
+    """Fail where claimed sets hide what is visible.
+
+    Args:
+        pvs: what is claimed, as for `check`, or a bake.
+        scene: the model, as for `check`.
+        cells: view cells, as for `check`; by default those of the bake, if `pvs` is one or a bake's folder.
+        rays: to cast.
+        options: further ones of `check`.
+
+    Returns:
+        What `check` found: nothing wrong-hidden.
+
+    Raises:
+        AssertionError: a sightline shows something that is claimed hidden; the message tells which, from where.
+        InputError: as for `check`.
+    """
+    __tracebackhide__ = True
+    # A bake is known by its folder, so that no heavy module is imported for nothing.
+    pvs = getattr(pvs, "folder", pvs)
+    if cells is None and isinstance(pvs, str | Path) and (Path(pvs) / "manifest.json").is_file():
+        cells = pvs
+    result = check(scene, pvs, cells, rays=rays, **options)
+    if not result.ok:
+        raise AssertionError(f"not conservative: {len(result.wrong):,} visible pairs are hidden\n{result.table()}")
+    return result
 
 
 def _sources(pvs: object) -> Sequence[object]:
     return [] if pvs is None else list(pvs) if isinstance(pvs, list | tuple) else [pvs]
 
 
-def _open(
+def open_model(
     model: Scene | str | Path, up: str | None, unit: str | float | None, doors: str
 ) -> tuple[Scene, Path | None] | CellGraph:
-    """The model, and where its own view cells are; or a bare graph."""
+    """The model, and where its own view cells are; or a bare graph.
+
+    Raises:
+        InputError: it is unreadable.
+    """
     if isinstance(model, Scene):
         return model, None
     path = Path(model)
@@ -121,6 +160,13 @@ def _open(
     from ..data.readers import read
 
     return read(path, up=up, unit=unit, doors=doors), None
+
+
+def opaque_and_glass(scene: Scene) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Triangles that stop sight and those that do not, each with the object of every triangle."""
+    triangles, owners = scene.triangles()
+    opaque = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
+    return (triangles[opaque], owners[opaque]), (triangles[~opaque], owners[~opaque])
 
 
 def read_kind(folder: Path) -> str:
@@ -154,11 +200,9 @@ class _Hunt:
 
     def __init__(self, scene: Scene, view: ViewCells, claims: Claims, rays: int, seed: int):
         self.rays, self.seed = rays, seed
-        triangles, owners = scene.triangles()
-        opaque = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
-        if not opaque.any():
+        self.opaque, self.glass = opaque_and_glass(scene)
+        if not len(self.opaque[0]):
             raise InputError(f"{scene.source or 'model'}: expected opaque triangles, found none")
-        self.opaque, self.glass = ((triangles[part], owners[part]) for part in (opaque, ~opaque))
         lines = Sightlines(*self.opaque)
         graph = view.graph
         self.judge = Judge(graph, lines, Sightlines(*self.glass), contact_links(graph.cells))
@@ -184,39 +228,88 @@ class _Hunt:
             grid_m=scene.grid_m,
             origin=scene.origin,
             snap_m=scene.max_snap_m(),
+            boxes=graph.cells,
         )
         # Pairs that no suspect is wanted of: claimed, or found wrong already.
         self.settled = {kind: matrix.copy() for kind, matrix in claimed.items()}
 
-    @contextmanager
-    def clock(self, phase: str) -> Iterator[None]:
-        """Add the time spent inside to a phase."""
-        start = time.perf_counter()
-        yield
-        self.result.seconds[phase] = self.result.seconds.get(phase, 0.0) + time.perf_counter() - start
-
     def run(self, progress: bool) -> None:
-        """Cast, judge, and measure what was found."""
-        with tqdm(total=self.rays, unit="ray", unit_scale=True, disable=not progress) as bar:
-            pass
-        with self.clock("measure"):
-            self.measure()
+        """Hunt, look again for what was not seen, and measure what was found."""
+        sources, claimed = self.result.sources, self.result.claimed
+        start = time.perf_counter()
+        objects = claimed.get("object", np.ones((len(self.result.cell_ids), len(self.result.object_names)), bool))
+        cells = {} if "cell" not in claimed else {"claimed_cells": claimed["cell"][sources]}
+        falsifier = Falsifier(
+            boxes=self.result.boxes[sources],
+            spots=self.spots,
+            claimed=objects[sources],
+            opaque=self.opaque,
+            glass=self.glass,
+            lines=self.judge.lines,
+            cells=self.result.boxes if cells else None,
+            seed=self.seed,
+            **cells,
+        )
+        self.result.seconds["prepare"] = time.perf_counter() - start
+        self.hunt(falsifier, progress)
+        self.look_again(falsifier)
+        start = time.perf_counter()
+        self.measure()
+        self.result.seconds["measure"] = time.perf_counter() - start
 
-    def judge_suspects(self, kind: str, suspects: "Candidates") -> np.ndarray:
-        """Judge suspects of one kind; keep the first confirmed one of each pair; say which rows were confirmed."""
-        with self.clock("adjudicate"):
-            result, cells = self.result, self.result.sources[suspects.rows]
-            ends = np.array([sightline_end(suspects, k, self.judge.graph.cells) for k in range(len(cells))])
-            ends = ends.reshape(-1, 3)
-            found = self.judge.judge_all(kind, cells, suspects.targets, suspects.origins, ends)
+    def hunt(self, falsifier: Falsifier, progress: bool) -> None:
+        """Rays that look for wrong-hidden pairs; the exact judge has the last word on each."""
+        start, judged = time.perf_counter(), self.result.seconds.get("adjudicate", 0.0)
+        with tqdm(total=self.rays, unit="ray", unit_scale=True, disable=not progress) as bar:
+            for suspects, state in falsifier.batches(self.rays):
+                self.judge_suspects(suspects)
+                bar.update(state.rays - bar.n)
+                if state.uniform_rays.min(initial=1):
+                    largest = Confidence(state.uniform_rays).holes_sr.max()
+                    bar.set_postfix_str(f"{len(self.result.wrong)} wrong-hidden, holes below {largest:.2g} sr")
+                self.result.rays = state.rays
+        self.result.uniform = falsifier.uniform_rays
+        if not self.result.rays:
+            self.result.statement = "exact: everything is claimed, so nothing is hidden"
+        spent = self.result.seconds.get("adjudicate", 0.0) - judged
+        self.result.seconds["rays"] = time.perf_counter() - start - spent
+
+    def look_again(self, falsifier: Falsifier) -> None:
+        """Mark the claimed pairs that the hunt saw, and look for the others."""
+        start = time.perf_counter()
+        marks = falsifier.seen()
+        objects, sources = len(self.result.object_names), self.result.sources
+        for kind, matrix in self.result.claimed.items():
+            marked = marks[:, :objects] if kind == "object" else marks[:, objects:]
+            self.result.seen[kind][sources] = marked & matrix[sources]
+        for kind, matrix in self.result.claimed.items():
+            rows, targets = np.nonzero(matrix[sources] & ~self.result.seen[kind][sources])
+            look = SecondLook(falsifier.free, falsifier.targets, self.opaque)
+            shift = 0 if kind == "object" else objects
+            found, cast = look.see(rows, targets + shift, AGAIN, self.seed)
+            self.result.seen[kind][sources[rows[found]], targets[found]] = True
+            self.result.rays += cast
+        self.result.seconds["look again"] = time.perf_counter() - start
+
+    def judge_suspects(self, suspects: Candidates) -> None:
+        """Judge suspects; keep the first confirmed one of each pair."""
+        start, result = time.perf_counter(), self.result
+        cells = result.sources[suspects.rows]
+        ends = [sightline_end(suspects, k, self.judge.graph.cells) for k in range(len(cells))]
+        ends = np.array(ends).reshape(-1, 3)
+        for number, kind in enumerate(("cell", "object")):
+            part = np.flatnonzero(suspects.kinds == number)
+            if not len(part):
+                continue
+            found = self.judge.judge_all(kind, cells[part], suspects.targets[part], suspects.origins[part], ends[part])
             result.grazes += int((found == Judgement.GRAZE).sum())
             result.blocked += int((found == Judgement.BLOCKED).sum())
-            for k in np.flatnonzero(found == Judgement.VISIBLE):
+            for k in part[found == Judgement.VISIBLE]:
                 pair = int(cells[k]), int(suspects.targets[k])
                 if not self.settled[kind][pair]:
                     self.settled[kind][pair] = True
                     result.wrong.append(WrongPair(kind, *pair, suspects.origins[k], ends[k]))
-            return found == Judgement.VISIBLE
+        result.seconds["adjudicate"] = result.seconds.get("adjudicate", 0.0) + time.perf_counter() - start
 
     def measure(self) -> None:
         """By how much the sightlines of wrong-hidden pairs clear their surroundings."""

@@ -10,7 +10,6 @@ import pyarrow.parquet as pq
 
 from ..data.claims import read_claims
 from ..data.database import Bake, cells_table, portals_table
-from ..data.errors import InputError
 from ..data.graph import CellGraph
 from ..data.scene import GRID_M
 from ..data.view_cells import ViewCells
@@ -19,13 +18,12 @@ from ..verify.witness import confirm_cells, read_witnesses, visible_rows
 from .bake import bake
 
 
-def check_graph(graph: CellGraph, pvs: Sequence[object], where: str, targets: str | None = None) -> CheckResult:
+def check_graph(graph: CellGraph, pvs: Sequence[object], targets: str | None = None) -> CheckResult:
     """Judge claims of cells that see cells by the portals between them.
 
     Args:
         graph: the cells and portals.
         pvs: the claims, as `data.claims.read_claims` takes them.
-        where: what to call the graph in errors.
         targets: as for `read_claims`.
 
     Returns:
@@ -38,8 +36,6 @@ def check_graph(graph: CellGraph, pvs: Sequence[object], where: str, targets: st
     start = time.perf_counter()
     view = ViewCells(graph, np.arange(graph.cell_count))
     claims = read_claims(pvs, view, [], targets)
-    if claims.cells is None:
-        raise InputError(f"{where}: expected claims of cells for a bare cell graph, found claims of objects")
     seconds = {"read": time.perf_counter() - start}
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "graph"
@@ -68,6 +64,7 @@ def _compare(graph: CellGraph, claimed: np.ndarray, truth: Bake, seconds: dict[s
         exact=True,
         seconds=seconds,
         grid_m=truth.grid_m,
+        boxes=graph.cells,
     )
     open_ = potential & ~seen & ~claimed
     if len(missing):

@@ -71,7 +71,7 @@ def check_map(
     result, why = None, "a winding is no axial rectangle"
     if is_axial(portals):
         try:
-            result = check_graph(axial_graph(portals, str(prt)), claims, str(prt), targets)
+            result = check_graph(axial_graph(portals, str(prt)), claims, targets)
         except InputError as error:
             # Leaves of an axial map that are no boxes, as compilers with detail brushes make them.
             why = str(error)
@@ -84,6 +84,8 @@ def check_map(
         result.grid_m = 1 / UNIT_STEPS
     result.seconds["read"] = time.perf_counter() - start - sum(result.seconds.values())
     result.unit, result.notes = "units", notes
+    judge = "portals" if result.exact else "windings"
+    result.asked = {"model": str(prt.resolve()), "judge": judge}
     return result
 
 
@@ -119,7 +121,7 @@ def _follow_lines(
                     result.wrong.append(WrongPair("cell", leaf, target, origin, end, tuple(path), margin))
             judging += time.perf_counter() - judged
             bar.update(lines * count)
-    result.rays = each * count
+    result.rays, result.boxes = each * count, boxes
     result.seconds = {"lines": time.perf_counter() - start - judging, "adjudicate": judging}
     share = -math.expm1(math.log(LEVEL / len(result.sources)) / each)
     result.statement = (

@@ -114,6 +114,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_make(commands)
     _add_bake(commands)
     _add_verify(commands)
+    _add_check(commands)
     _add_report(commands)
     return parser
 
@@ -206,6 +207,40 @@ def _add_verify(commands: argparse._SubParsersAction) -> None:
     verify.add_argument("--replay", metavar="CASE", help="judge the sightline of a case file again, and nothing else")
     verify.add_argument("--no-progress", action="store_true", help="no progress bar")
     _seed(verify, "origins and directions")
+
+
+def _add_check(commands: argparse._SubParsersAction) -> None:
+    check = _command(commands, "check", "check", "Look for what anybody's potentially visible sets wrongly hide.")
+    check.add_argument(
+        "model",
+        metavar="MODEL",
+        nargs="?",
+        help="IFC, glTF, OBJ, PLY, STL, a scene or bake folder, cells and portals, or a compiled map (.bsp, .prt); "
+        "with --replay, that of the check if left out",
+    )
+    check.add_argument(
+        "--cells",
+        metavar="CELLS",
+        help="view cells: a Parquet or CSV table of boxes in the model's metres, or a bake; for a .bsp its .prt",
+    )
+    check.add_argument(
+        "--pvs",
+        metavar="PVS",
+        nargs="+",
+        help="what is claimed: tables of cell_id and object_id or reached_cell_id, .npy matrices, a bake, a .bsp",
+    )
+    check.add_argument(
+        "--targets", choices=["objects", "cells"], help="what a matrix's columns are, if its shape leaves a doubt"
+    )
+    check.add_argument("--rays", type=_whole(1), default=4_000_000, help="to cast; 4,000,000 by default")
+    check.add_argument("--up", choices=["y", "z"], help="axis that points up in a mesh file")
+    check.add_argument("--unit", help="unit of a mesh file, a name or metres; metre by default")
+    check.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")
+    check.add_argument("--out", metavar="FOLDER", help="where to write all sightlines and the cells' numbers")
+    check.add_argument("--shown", type=_whole(1), default=10, help="lines of each table; 10 by default")
+    check.add_argument("--replay", metavar="FOLDER", help="judge the sightlines in an earlier check's folder again")
+    check.add_argument("--no-progress", action="store_true", help="no progress bar")
+    _seed(check, "rays")
 
 
 def _add_report(commands: argparse._SubParsersAction) -> None:

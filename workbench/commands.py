@@ -150,6 +150,39 @@ def verify(options: argparse.Namespace) -> int:
     return 0 if result.ok else FAILED
 
 
+def check(options: argparse.Namespace) -> int:
+    """Check claims of any baker; the exit code says whether something visible was found hidden."""
+    _start_warp()
+    from .check import check as look
+    from .check_folder import check_place, replay, write_check
+
+    if options.replay is not None:
+        left, lines = replay(options.replay, options.model)
+        say("\n".join(lines))
+        return FAILED if left else 0
+    if options.model is None:
+        raise InputError("check: expected a model or --replay FOLDER, found neither")
+    if options.out:
+        check_place(options.out)
+    result = look(
+        options.model,
+        options.pvs,
+        options.cells,
+        rays=options.rays,
+        seed=options.seed,
+        targets=options.targets,
+        up=options.up,
+        unit=_unit(options.unit),
+        doors=options.doors or "open",
+        progress=_progress(options),
+    )
+    say(result.table(options.shown))
+    if options.out:
+        write_check(result, options.out)
+        say(f"written to {options.out}")
+    return 0 if result.ok else FAILED
+
+
 def report(options: argparse.Namespace) -> int:
     """Write a report and say where it is."""
     from ..data.database import load
