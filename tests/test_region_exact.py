@@ -14,8 +14,8 @@ from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
 from viewcell.data.verdict import Verdict
 from viewcell.kernels.shaft import launch_shaft
 from viewcell.verify.matrix_game import play
-from viewcell.verify.region_certificate import holds, plane
-from viewcell.verify.region_exact import box_faces, cell_faces, region_visible, segment_clear
+from viewcell.verify.region_certificate import _hidden, holds, plane, side
+from viewcell.verify.region_exact import _corner, _dual, box_faces, cell_faces, region_visible, segment_clear
 from viewcell.verify.shadow_exact import along, box_corners, dot, hides, in_hull, minus, occluder, rational
 
 SHAFT = runpy.run_path(str(Path(__file__).with_name("test_shaft.py")))
@@ -346,6 +346,30 @@ def test_the_limit_of_nodes_is_told():
     walls, target = box_faces([-10, -10, -10], [10, 10, 10]), [[24, 16, 16], [16, 24, 16], [16, 16, 24]]
     answer = region_visible([[-42, -42, -42], [-38, -38, -38]], target, walls, nodes=5)
     assert answer.verdict is Verdict.UNKNOWN and answer.certificate is None and answer.start is None
+
+
+@pytest.mark.parametrize("apart", [0, 1])
+def test_three_edges_are_a_corner_only_if_no_line_passes_outside_all(apart):
+    random, agreed = np.random.default_rng(8 + apart), {True: 0, False: 0}
+    for _ in range(200):
+        near, far = random.integers(-9, 10, (3, 3)), random.integers(-9, 10, (3, 3))
+        near[:, 0], far[:, 0] = random.integers(-40, -30, 3), random.integers(30, 40, 3)
+        ways = random.integers(-5, 6, (3, 3))
+        if not np.linalg.det(ways).round() or not np.cross(near[1] - near[0], near[2] - near[0]).any():
+            continue
+        starts = np.zeros((3, 3), int) + random.integers(-2, 3, 3) + apart * random.integers(-3, 4, (3, 3))
+        edges = [
+            [[int(c) for c in start], [int(c) for c in start + way]] for start, way in zip(starts, ways, strict=True)
+        ]
+        a, b = near.tolist(), far.tolist()
+        claimed = _hidden(a, b, edges, [], ("corner", 0, 1, 2))
+        duals = [_dual((*u, 1), (*v, 1)) for u, v in edges]
+        assert claimed == (_corner([(*p, 1) for p in a], [(*t, 1) for t in b], duals) is not None)
+        shares = random.dirichlet(np.ones(3), (2, 60))
+        pairs = zip(shares[0] @ near, shares[1] @ far, strict=True)
+        assert not claimed or all(min(side(p, t, edge) for edge in edges) < 1e-6 for p, t in pairs)
+        agreed[claimed] += 1
+    assert agreed[False] > 50 and (apart or agreed[True] > 10)
 
 
 def test_what_halving_leaves_open_is_not_called_hidden():
