@@ -25,13 +25,14 @@ class SecondLook:
 
         Sampled by Embree, so a pair that is not seen may be visible.
         """
-        seen, rng, cast = np.zeros(len(rows), bool), np.random.default_rng(seed), 0
-        for _ in range(tries):
+        seen, rng, cast, done, copies = np.zeros(len(rows), bool), np.random.default_rng(seed), 0, 0, 1
+        while done < tries:
             left = np.flatnonzero(~seen)
-            for first in range(0, len(left), BATCH):
-                part = left[first : first + BATCH]
-                seen[part] = self._joined(rows[part], targets[part], rng)
-                cast += len(part)
+            for part in np.array_split(left, max(1, copies * len(left) // BATCH)):
+                again = np.repeat(part, copies)
+                seen[again[self._joined(rows[again], targets[again], rng)]] = True
+                cast += len(again)
+            done, copies = done + copies, min(2 * copies, tries - done - copies)
         return seen, cast
 
     def _joined(self, rows: np.ndarray, targets: np.ndarray, rng: np.random.Generator) -> np.ndarray:
