@@ -384,7 +384,7 @@ def test_points_and_neighbours():
 def test_sharp_edges_of_boxes_and_sheets():
     unit = np.array(list(product((0, 64), repeat=3)))
     sheet = np.array([[[0, 0, 9], [8, 0, 9], [8, 8, 9]], [[0, 0, 9], [8, 8, 9], [0, 8, 9]]])
-    triangles = np.concatenate([unit[HOUSE["FACES"]], sheet, (unit + 64)[HOUSE["FACES"]]])
+    triangles = np.concatenate([unit[HOUSE["FACES"]], sheet, (unit + np.array([64, 0, 0]))[HOUSE["FACES"]]])
     owners, starts, ends = sharp_edges(triangles, np.repeat([0, 1, 2], [12, 2, 12]))
     assert np.bincount(owners).tolist() == [12, 4, 12] and (np.diff(owners) >= 0).all()
     lengths = np.abs(ends - starts)
