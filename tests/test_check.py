@@ -261,7 +261,7 @@ def test_a_bake_needs_no_cells(tmp_path, house):
 
 def test_assert_conservative_fails_usefully(house, claims):
     assert_conservative(claims[0], house.scene, boxes_of(house), rays=RAYS)
-    with pytest.raises(AssertionError, match=r"not conservative: 1 visible pairs are hidden(.|\n)*sees object"):
+    with pytest.raises(AssertionError, match=r"not conservative: 1 visible pair claimed hidden(.|\n)*sees object"):
         assert_conservative(without(claims[0], 2), house.scene, boxes_of(house), rays=RAYS)
 
 
@@ -277,4 +277,4 @@ def test_plugin(tmp_path, house, claims):
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert done.returncode == code, done.stdout + done.stderr
-    assert "not conservative: 1 visible pairs are hidden" in done.stdout and "sees object" in done.stdout
+    assert "not conservative: 1 visible pair claimed hidden" in done.stdout and "sees object" in done.stdout

@@ -114,7 +114,7 @@ class CheckResult:
         """The result in Markdown: totals, wrong-hidden pairs, and the worst cells; at most `shown` lines of each."""
         found = {kind: sum(w.kind == kind for w in self.wrong) for kind in self.claimed}
         rows = [
-            ("wrong-hidden", ", ".join(f"{count:,} {kind}s" for kind, count in found.items())),
+            ("wrong-hidden", ", ".join(counted(count, kind) for kind, count in found.items())),
             ("confidence", self.confidence_line()),
             ("view cells", f"{len(self.sources):,}"),
         ]
@@ -183,6 +183,11 @@ class CheckResult:
                 numbers = f"{claimed[row]:,} | {seen[row]:,} | {_ratio(claimed[row], seen[row])} | {wrong[row]:,}"
                 lines.append(f"| {self.cell_ids[self.sources[row]]} | {numbers} |")
         return lines
+
+
+def counted(count: int, what: str) -> str:
+    """A number of things, in words."""
+    return f"{count:,} {what}{'' if count == 1 else 's'}"
 
 
 def _ratio(claimed: int, seen: int) -> str:

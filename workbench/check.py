@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import warp as wp
 from tqdm import tqdm
 
 from ..data.claims import Claims, read_claims
@@ -22,7 +23,7 @@ from ..data.view_cells import ViewCells, read_rows, view_cells
 from ..verify.adjudicate import Judge, Judgement, sightline_end
 from ..verify.again import SecondLook
 from ..verify.aims import ORIGINS_MOST, cell_origins
-from ..verify.check_result import CheckResult, WrongPair
+from ..verify.check_result import CheckResult, WrongPair, counted
 from ..verify.clearance import clearances
 from ..verify.confidence import Confidence
 from ..verify.falsify import Falsifier
@@ -76,6 +77,8 @@ def check(
     """
     if rays < 1:
         raise InputError(f"rays: expected 1 or more, found {rays}")
+    # Warp greets whoever starts it, unless told not to before.
+    wp.config.log_level = wp.LOG_WARNING
     start = time.perf_counter()
     if isinstance(model, str | Path) and Path(model).suffix.lower() in (".bsp", ".prt"):
         from .check_map import check_map
@@ -127,7 +130,8 @@ def assert_conservative(
         cells = pvs
     result = check(scene, pvs, cells, rays=rays, **options)
     if not result.ok:
-        raise AssertionError(f"not conservative: {len(result.wrong):,} visible pairs are hidden\n{result.table()}")
+        hidden = counted(len(result.wrong), "visible pair")
+        raise AssertionError(f"not conservative: {hidden} claimed hidden\n{result.table()}")
     return result
 
 
