@@ -354,7 +354,7 @@ def test_where_chance_finds_nothing_the_given_points_are_used():
     scale, low = np.array([1000, 1000, 4999]), np.array([0, 0, 5001])
     corners = np.concatenate([(points * scale)[HOUSE["FACES"]], (low + points * scale)[HOUSE["FACES"]]])
     lines = Sightlines(corners, np.repeat([0, 1], 12))
-    given_point = np.array([[500, 500, 5000]], np.float32)
+    given_point = np.array([[400, 500, 5000]], np.float32)
     space = FreeSpace(np.array([[[0, 0, 10], [1000, 1000, 9990]]]), [given_point], lines)
     points, fresh, mixed = space.draw(np.zeros(2000, int), np.random.default_rng(0))
     assert mixed[fresh].all()
