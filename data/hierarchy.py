@@ -55,6 +55,32 @@ def build_hierarchy(boxes: np.ndarray) -> Hierarchy:
     return Hierarchy(node_boxes, links)
 
 
+def build_levels(boxes: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    """The same tree level by level, for searches that take a whole level at once.
+
+    Args:
+        boxes: shape (n, 2, 3), integers.
+
+    Returns:
+        Node bounds, one array (2**level, 2, 3), int32, a level, low > high where empty; and the box of each node of the
+        last level, -1 for none.
+    """
+    count = len(boxes)
+    depth = int(np.ceil(np.log2(count))) if count > 1 else 0
+    places = np.arange(count) * 2**depth // max(count, 1)
+    items = np.full(2**depth, -1, np.int64)
+    items[places] = median_order(boxes.astype(np.int64).sum(axis=1), places, depth)
+    bounds = np.empty((2**depth, 2, 3), np.int64)
+    bounds[:, 0], bounds[:, 1] = EMPTY, -EMPTY
+    bounds[items >= 0] = boxes[items[items >= 0]]
+    levels = [bounds.astype(np.int32)]
+    for _ in range(depth):
+        pairs = bounds.reshape(-1, 2, 2, 3)
+        bounds = np.stack([pairs[:, :, 0].min(axis=1), pairs[:, :, 1].max(axis=1)], axis=1)
+        levels.append(bounds.astype(np.int32))
+    return levels[::-1], items
+
+
 def median_order(centres: np.ndarray, leaves: np.ndarray, depth: int) -> np.ndarray:
     """Order of the boxes that halves every node at the median of its widest axis.
 

@@ -10,7 +10,7 @@ from hashlib import sha256
 
 import numpy as np
 
-from .hierarchy import EMPTY, median_order
+from .hierarchy import build_levels
 from .incidence import CHUNK, clip_bounds
 from .scene import Scene
 
@@ -43,30 +43,12 @@ def find_occludees(scene: Scene) -> Occludees:
     """Occludees of all objects of a scene, opaque or not."""
     bounds = scene.object_bounds()
     present = np.flatnonzero((bounds[:, 0] <= bounds[:, 1]).all(axis=1))
-    levels, objects = _hierarchy(bounds[present])
+    levels, objects = build_levels(bounds[present])
     objects = np.where(objects >= 0, present[objects], -1).astype(np.int32)
     pieces, owner = _pieces(scene, bounds)
     return Occludees(
         bounds.astype(np.int32), levels, objects, pieces, np.searchsorted(owner, np.arange(len(bounds) + 1))
     )
-
-
-def _hierarchy(boxes: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """Node bounds level by level, and the box of each node of the last level, -1 for none."""
-    count = len(boxes)
-    depth = int(np.ceil(np.log2(count))) if count > 1 else 0
-    places = np.arange(count) * 2**depth // max(count, 1)
-    items = np.full(2**depth, -1, np.int64)
-    items[places] = median_order(boxes.sum(axis=1), places, depth)
-    bounds = np.empty((2**depth, 2, 3), np.int64)
-    bounds[:, 0], bounds[:, 1] = EMPTY, -EMPTY
-    bounds[items >= 0] = boxes[items[items >= 0]]
-    levels = [bounds.astype(np.int32)]
-    for _ in range(depth):
-        pairs = bounds.reshape(-1, 2, 2, 3)
-        bounds = np.stack([pairs[:, :, 0].min(axis=1), pairs[:, :, 1].max(axis=1)], axis=1)
-        levels.append(bounds.astype(np.int32))
-    return levels[::-1], items
 
 
 def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -308,6 +308,51 @@ def append_side(
 
 
 @wp.func
+def has_room(counts: vec6i) -> bool:
+    """Whether the rows of one more way fit."""
+    for p in range(6):
+        if counts[p] + 4 > LIST_CAPACITY:
+            return False
+    return True
+
+
+@wp.func
+def has_way(cursor: int, plane: f64, axis: int, s_hi: wp.vec3d, t_lo: wp.vec3d, strict: int) -> bool:
+    """Whether way `cursor` to miss a blocker exists: four sides always, the other two where its plane cuts a box."""
+    if cursor == 4:
+        return cuts_target(plane, t_lo[axis], strict)
+    if cursor == 5:
+        return plane < s_hi[axis]
+    return True
+
+
+@wp.func
+def append_way(
+    work: wp.array(dtype=f64),
+    lists: int,
+    counts: vec6i,
+    lo: wp.vec3d,
+    hi: wp.vec3d,
+    axis: int,
+    order: int,
+    cursor: int,
+    s_hi: wp.vec3d,
+    t_lo: wp.vec3d,
+) -> vec6i:
+    """The rows of way `cursor` to miss a blocker: a side, and short of the sides before it in `order`, or beyond it."""
+    out = counts
+    if cursor < 4:
+        for earlier in range(cursor + 1):
+            side = (order >> (2 * earlier)) & 3
+            out = append_side(work, lists, out, lo, hi, axis, side, earlier < cursor)
+    elif cursor == 4:
+        out = append_beyond(work, lists, out, lo[axis], axis, t_lo, True)
+    else:
+        out = append_beyond(work, lists, out, lo[axis], axis, s_hi, False)
+    return out
+
+
+@wp.func
 def inset(lo: wp.vec3d, hi: wp.vec3d, clearance: f64) -> wp.vec3d:
     """How far to shrink a box on each axis: the clearance, but never more than a quarter of the box."""
     out = wp.vec3d()
@@ -446,27 +491,17 @@ def _search(
                         axis = tree.axis[blocker]
                         for p in range(6):
                             counts[p] = frames[at + 3 + p]
-                        grown = counts
-                        full = bool(False)
-                        for p in range(6):
-                            if counts[p] + 4 > LIST_CAPACITY:
-                                full = True
-                        if full:
+                        if not has_room(counts):
                             verdict = UNDECIDED
                             depth = -1
                             octant = 8
                         else:
                             answer = HIDDEN
-                            if cursor < 4:
-                                for earlier in range(cursor + 1):
-                                    side = (frames[at + 2] >> (2 * earlier)) & 3
-                                    grown = append_side(work, lists, grown, lo, hi, axis, side, earlier < cursor)
-                                answer = decide(work, lists, level, level + LEVEL_SIZE, spare, counts, grown)
-                            elif cursor == 4 and cuts_target(lo[axis], t_lo[axis], pair[2]):
-                                grown = append_beyond(work, lists, grown, lo[axis], axis, t_lo, True)
-                                answer = decide(work, lists, level, level + LEVEL_SIZE, spare, counts, grown)
-                            elif cursor == 5 and lo[axis] < s_hi[axis]:
-                                grown = append_beyond(work, lists, grown, lo[axis], axis, s_hi, False)
+                            grown = counts
+                            if has_way(cursor, lo[axis], axis, s_hi, t_lo, pair[2]):
+                                grown = append_way(
+                                    work, lists, counts, lo, hi, axis, frames[at + 2], cursor, s_hi, t_lo
+                                )
                                 answer = decide(work, lists, level, level + LEVEL_SIZE, spare, counts, grown)
                             if answer == UNDECIDED:
                                 verdict = UNDECIDED
