@@ -9,15 +9,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import warp as wp
-from hypothesis import given
-from hypothesis import strategies as st
 from viewcell.data.database import load
 from viewcell.data.errors import InputError
 from viewcell.data.scene import Role
 from viewcell.verify.adjudicate import Judgement, sightline_end
 from viewcell.verify.aims import cell_origins
 from viewcell.verify.bench import falsify as bench
-from viewcell.verify.falsify import ATTEMPTS, SHARES, Falsifier, Progress, missed_solid_angle, scaled_shares
+from viewcell.verify.crossing import crossed_cells
+from viewcell.verify.falsify import ATTEMPTS, SHARES, Falsifier, scaled_shares
 from viewcell.verify.free_space import FREE, MIXED, SOLID, FreeSpace
 from viewcell.verify.guide import Hints, edge_table, pass_edges
 from viewcell.verify.hints import certificate_hints, patch_margin, region_margin
@@ -220,7 +219,6 @@ def test_uniform_rays_are_counted(house):
     assert np.ptp(np.delete(counted, room)) <= 20 and (counted >= 0.24 * cast).all() and counted.sum() <= cast
     # 288 of 48,000 parts of the room are solid.
     assert cast - counted.sum() == pytest.approx(0.006 * counted[room], abs=15)
-    assert (progress.bound() == [missed_solid_angle(int(n)) for n in progress.uniform_rays]).all()
 
 
 def test_uniform_rays_are_uniform_and_outside_solids(house):
@@ -248,16 +246,25 @@ def test_uniform_rays_are_uniform_and_outside_solids(house):
     assert np.abs(np.abs(directions).mean(axis=0) - 0.5).max() < 0.01
 
 
-@given(st.integers(1, 10**12), st.floats(0.01, 0.999))
-def test_missed_solid_angle(rays, confidence):
-    share = missed_solid_angle(rays, confidence) / (4 * math.pi)
-    assert 0 < share <= 1
-    assert rays * math.log1p(-min(share, 1 - 1e-16)) == pytest.approx(math.log1p(-confidence), rel=1e-6)
+def test_uniform_rays_see_hidden_cells_too(house):
+    """Without any ray aimed at it, a hidden room is found by the uniform rays that pass through it."""
+    claim = without(house.cells, list(house.sources).index(0), 2)
+    falsifier = search(house, claimed_cells=claim, cells=house.boxes, shares={"uniform": 1.0})
+    assert confirmed(house, falsifier) == {(list(house.sources).index(0), 0, 2)}
 
 
-def test_without_uniform_rays_nothing_is_bounded():
-    assert missed_solid_angle(0) == 4 * math.pi
-    assert Progress(0, np.array([0, 10]), {}).bound()[0] == 4 * math.pi
+def test_crossed_cells_are_those_before_the_hit():
+    boxes = np.array([[[0, 0, 0], [10, 10, 10]], [[20, 0, 0], [25, 10, 10]], [[30, 0, 0], [60, 10, 10]]], np.float32)
+    origins = np.tile(np.float32([5, 5, 5]), (5, 1))
+    directions = np.float32([[1, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0]])
+    reach = np.float32([24, 14, np.inf, np.inf, np.inf])
+    wanted = np.array([[False, True, True]])
+    found = crossed_cells(origins, directions, reach, np.zeros(5, int), boxes, wanted)
+    # Room 2 is crossed for longest; room 1 alone where the ray ends before it; a ray beside, and one away, cross none.
+    assert found.tolist() == [1, -1, 2, -1, -1]
+    assert crossed_cells(origins[:1], directions[:1], reach[2:3], np.zeros(1, int), boxes, wanted & False).tolist() == [
+        -1
+    ]
 
 
 def test_shares_are_scaled():

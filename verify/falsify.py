@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data.errors import InputError
+from .crossing import crossed_cells
 from .free_space import FreeSpace, all_axes
 from .guide import SHORT, STRATEGIES, Aimed, Guide, Hints, Lesson, length, slab
 from .rays import Candidates, embree_scene
@@ -48,24 +49,6 @@ class Progress:
     rays: int
     uniform_rays: np.ndarray
     by_strategy: dict[str, int]
-
-    def bound(self, confidence: float = 0.95) -> np.ndarray:
-        """For each view cell `missed_solid_angle` of its uniform rays [sr], shape (rows,), float64."""
-        return np.array([missed_solid_angle(int(count), confidence) for count in self.uniform_rays])
-
-
-def missed_solid_angle(rays: int, confidence: float = 0.95) -> float:
-    """Solid angle x [sr] that rays would have found with this confidence: (1 - x / 4 pi) ** rays = 1 - confidence.
-
-    Args:
-        rays: independent, origin uniform in the free part of the view cell, direction uniform on the sphere.
-        confidence: above 0, below 1.
-
-    Returns:
-        If what a view cell wrongly hides, taken together, fills more than x on the mean over the free origins, the
-        chance that all rays miss it is below 1 - confidence; 4 pi without rays.
-    """
-    return -4 * math.pi * math.expm1(math.log1p(-confidence) / rays) if rays else 4 * math.pi
 
 
 class Falsifier:
@@ -218,8 +201,8 @@ class Falsifier:
         """One ray for each hidden pair that the rays show."""
         hit = np.flatnonzero(objects >= 0)
         shown = [(hit, objects[hit], reach[hit]), *self._through_glass(aimed.origins, directions, reach)]
-        entered = self._entered(aimed, directions, reach)
-        shown.append((entered, aimed.targets[entered], reach[entered]))
+        for ray, target in (self._entered(aimed, directions, reach), self._crossed(aimed, directions, reach)):
+            shown.append((ray, target, reach[ray]))
         ray, target, far = (np.concatenate(column) for column in zip(*shown, strict=True))
         keys = aimed.rows[ray] * self.targets.count + target
         wrong = np.flatnonzero(self._guide.hidden.ravel()[keys] & (self._attempts[keys] < ATTEMPTS))
@@ -233,13 +216,23 @@ class Falsifier:
         along = directions[ray[wrong]].astype(np.float64)
         return Candidates(rows, is_object.astype(np.int64), targets, starts, along, far[wrong].astype(np.float64))
 
-    def _entered(self, aimed: Aimed, directions: np.ndarray, reach: np.ndarray) -> np.ndarray:
-        """The rays that enter the cell they are aimed at before they are stopped."""
+    def _entered(self, aimed: Aimed, directions: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The rays that enter the cell they are aimed at before they are stopped, and that cell."""
         rays = np.flatnonzero(aimed.targets >= self.targets.objects)
         low, high = self.targets.cells[aimed.targets[rays] - self.targets.objects].transpose(1, 0, 2)
         with np.errstate(divide="ignore", invalid="ignore"):
             enter, leave = slab(aimed.origins[rays], directions[rays], low, high)
-        return rays[enter < np.float32(SHORT) * np.fmin(leave, reach[rays])]
+        rays = rays[enter < np.float32(SHORT) * np.fmin(leave, reach[rays])]
+        return rays, aimed.targets[rays]
+
+    def _crossed(self, aimed: Aimed, directions: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The uniform rays that pass through a hidden cell, wherever it is, and that cell."""
+        objects, rays = self.targets.objects, np.flatnonzero(aimed.fresh)
+        hidden = self._guide.hidden
+        wanted = (hidden & (self._attempts.reshape(hidden.shape) < ATTEMPTS))[:, objects:]
+        columns = (aimed.origins[rays], directions[rays], reach[rays], aimed.rows[rays])
+        cells = crossed_cells(*columns, self.targets.cells, wanted)
+        return rays[cells >= 0], cells[cells >= 0].astype(np.int64) + objects
 
     def _through_glass(
         self, origins: np.ndarray, directions: np.ndarray, reach: np.ndarray

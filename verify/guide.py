@@ -3,7 +3,7 @@
 Every ray serves one strategy. What guides them is the claim and what earlier rays met, never the truth:
 
 - uniform: origin uniform in the free part of the view cell, direction uniform on the sphere, both independent. Only
-  these bound what is missed; `falsify.missed_solid_angle`.
+  these bound what is missed; `confidence.Confidence`.
 - aim: from a free point at a point of a hidden target. A pair is as likely as the square of how many of the target's
   16 nearest targets the view cell claims to see, and less so the oftener it was tried.
 - near: from where a ray has seen a claimed object, at a hidden target near that object. Seldom seen objects come first:
