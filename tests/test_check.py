@@ -15,11 +15,15 @@ import viewcell
 from scipy.spatial import cKDTree
 from viewcell import InputError
 from viewcell.data.database import cells_table
+from viewcell.data.scene import Role
 from viewcell.data.scene_folder import write_scene
 from viewcell.data.view_cells import view_cells
+from viewcell.verify.again import SecondLook
 from viewcell.verify.clearance import clearances
 from viewcell.verify.confidence import Confidence
+from viewcell.verify.free_space import FreeSpace
 from viewcell.verify.sightline import Sightlines
+from viewcell.verify.surfaces import Targets
 from viewcell.workbench.check import assert_conservative, check
 from viewcell.workbench.cli import main
 
@@ -146,6 +150,25 @@ def test_clearances_are_distances():
         # Samples are up to 2 steps apart, so their distances are a little too long.
         assert (found[row] <= np.array(ranked) + 1e-9).all() and (found[row] >= np.array(ranked) - 2).all()
         assert all(near[k] - 2 <= d <= near[k] for k, d in zip(objects[row], found[row], strict=True))
+
+
+def test_a_second_look_sees_what_is_visible_and_nothing_else(house):
+    sources = np.flatnonzero(house.graph.inhabitable)
+    triangles, owners = house.scene.triangles()
+    opaque = house.scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
+    boxes, lines = house.graph.cells, Sightlines(triangles[opaque], owners[opaque])
+    free = FreeSpace(boxes[sources], [np.zeros((0, 3), np.float32)] * len(sources), lines)
+    targets = Targets(triangles, owners, len(house.scene.objects), boxes)
+    look = SecondLook(free, targets, (triangles[opaque], owners[opaque]))
+    truth = np.concatenate([house.potential_objects, house.potential_cells], axis=1)[sources]
+    rows, columns = (part.ravel() for part in np.indices(truth.shape))
+    seen, cast = look.see(rows, columns, 100, 0)
+    assert not (seen & ~truth.ravel()).any()
+    # A wall of which a sliver shows through two doorways takes more than a hundred rays.
+    assert seen.sum() >= truth.sum() - 3
+    assert len(rows) < cast < 100 * len(rows)
+    glass = house.scene.objects[-1].role is Role.TRANSPARENT
+    assert glass and seen.reshape(truth.shape)[:, len(house.scene.objects) - 1].any()
 
 
 def test_confidence_holds_as_often_as_it_says():

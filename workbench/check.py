@@ -283,9 +283,9 @@ class _Hunt:
         start = time.perf_counter()
         marks = falsifier.seen()
         objects, sources = len(self.result.object_names), self.result.sources
-        for kind, matrix in self.result.claimed.items():
+        for kind in self.result.claimed:
             marked = marks[:, :objects] if kind == "object" else marks[:, objects:]
-            self.result.seen[kind][sources] = marked & matrix[sources]
+            self.result.seen[kind][sources] = marked
         for kind, matrix in self.result.claimed.items():
             rows, targets = np.nonzero(matrix[sources] & ~self.result.seen[kind][sources])
             look = SecondLook(falsifier.free, falsifier.targets, self.opaque)
