@@ -101,7 +101,7 @@ def walk_windings(
                 way = -way
             if wp.abs(wp.dot(windings.normals[winding], way)) < SLANT:
                 margin = wp.float64(-1.0)
-            here, through, at = int(beyond), int(winding), wp.float64(0.0)
+            here, at = int(beyond), wp.float64(0.0)
             for _ in range(STEPS):
                 if margin < MARGIN:
                     break
@@ -122,7 +122,7 @@ def walk_windings(
                 for k in range(windings.leaf_starts[here], windings.leaf_starts[here + 1]):
                     other = windings.leaf_windings[k]
                     slope = wp.dot(windings.normals[other], way)
-                    if other != through and wp.abs(slope) > SLANT:
+                    if wp.abs(slope) > SLANT:
                         time = (windings.offsets[other] - wp.dot(windings.normals[other], origin)) / slope
                         if time > at + wp.float64(1.0e-6):
                             inside = _clear_by(windings, other, origin + way * time)
@@ -133,7 +133,6 @@ def walk_windings(
                                 break
                 if left < 0:
                     break
-                through = left
                 here = windings.leaves[left, 0] + windings.leaves[left, 1] - here
                 if here == leaf:
                     break

@@ -1,0 +1,332 @@
+"""Hypothesis strategies for tests of visibility code, yours or ours; they need `pip install viewcell[test]`.
+
+Most examples lie on or within two grid steps of a coincidence: edges that a sightline touches, doors that just do not
+line up, walls that share an edge or leave a slit. Every example prints as a line that can be pasted into a test, and
+shrinks towards few and simple parts.
+
+    from hypothesis import given
+    from viewcell.verify.strategies import buildings
+
+    @given(buildings())
+    def test_my_baker_is_conservative(building):
+        viewcell.assert_conservative(my_baker(building.scene), building.scene, building.view_cells)
+
+Coordinates are integer grid steps of 2**-10 m.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import pairwise, product
+
+import numpy as np
+
+from ..data.graph import CellGraph
+from ..data.opaque import OpaquePlanes
+from ..data.portals import find_portals
+from ..data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene, Space
+
+try:
+    from hypothesis import strategies as st
+except ImportError as error:
+    raise ImportError("viewcell.verify.strategies needs Hypothesis: pip install viewcell[test]") from error
+
+Point = tuple[int, int, int]
+Box = tuple[Point, Point]
+# Steps off a coincidence.
+NEAR = st.integers(-2, 2)
+# Grid steps in a module of a building, and thickness of its walls.
+MODULE, WALL = 1024, 128
+CORNERS = np.array(list(product((0, 1), repeat=3)))
+QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+FACES = np.array([face for a, b, c, d in QUADS for face in ((a, b, c), (a, c, d))], np.int32)
+
+
+@dataclass(frozen=True)
+class PortalSequence:
+    """Boxes that a line of one direction octant may or may not stab.
+
+    Attributes:
+        boxes: (low, high corner) of each; flat ones are portals.
+        signs: direction octant, three of +-1.
+    """
+
+    boxes: tuple[Box, ...]
+    signs: Point
+
+    def array(self) -> np.ndarray:
+        """The boxes, shape (n, 2, 3), int64."""
+        return np.array(self.boxes, np.int64)
+
+
+@dataclass(frozen=True)
+class OccludedPair:
+    """A view cell and a target with a few convex polygons between them.
+
+    Attributes:
+        cell: (low, high corner), with volume.
+        target: corners of a convex polygon.
+        occluders: corners of convex polygons, planar.
+    """
+
+    cell: Box
+    target: tuple[Point, ...]
+    occluders: tuple[tuple[Point, ...], ...]
+
+
+@dataclass(frozen=True)
+class Knapsack:
+    """A choice of one level for each object under a budget.
+
+    Attributes:
+        benefits: of each object's levels.
+        costs: the same shape; integers >= 0.
+        budget: integer >= 0.
+    """
+
+    benefits: tuple[tuple[int, ...], ...]
+    costs: tuple[tuple[int, ...], ...]
+    budget: int
+
+
+@dataclass(frozen=True)
+class Door:
+    """An opening in the wall between a room and the next one.
+
+    Attributes:
+        room: column, row and storey of the room.
+        axis: 0 or 1 for a door to the next column or row, 2 for a void in the slab above.
+        low: of the opening on the two other axes, from the room's low corner.
+        high: likewise.
+    """
+
+    room: Point
+    axis: int
+    low: tuple[int, int]
+    high: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Building:
+    """Rooms on a grid, walls with openings, and furniture.
+
+    Attributes:
+        rooms: columns, rows and storeys.
+        doors: openings; two in one wall may touch or overlap.
+        furniture: boxes.
+    """
+
+    rooms: Point
+    doors: tuple[Door, ...] = ()
+    furniture: tuple[Box, ...] = ()
+
+    def room(self, place: Point) -> np.ndarray:
+        """Box of a room, shape (2, 3)."""
+        low = np.array(place) * MODULE + WALL // 2
+        return np.array([low, low + MODULE - WALL])
+
+    @cached_property
+    def solids(self) -> list[Box]:
+        """Boxes of walls and slabs, those around the building included; they touch but do not overlap."""
+        out = [box for panel in self._panels() for box in panel[0]]
+        # Walls meet in posts and beams, from node to node of the grid.
+        for place in product(*(range(n + 1) for n in self.rooms)):
+            node = np.array(place) * MODULE - WALL // 2
+            out.append(_box(node, node + WALL))
+            for axis in range(3):
+                if place[axis] < self.rooms[axis]:
+                    along = np.arange(3) == axis
+                    out.append(_box(node + along * WALL, node + np.where(along, MODULE, WALL)))
+        return out
+
+    def _panels(self) -> list[tuple[list[Box], list[Box]]]:
+        """Walls between rooms and around them, without posts and beams: solid pieces, and open ones, of each."""
+        found = []
+        for axis in range(3):
+            for place in product(*(range(n + (i == axis)) for i, n in enumerate(self.rooms))):
+                below = tuple(c - (i == axis) for i, c in enumerate(place))
+                inside = 0 < place[axis] < self.rooms[axis]
+                found.append(
+                    self._panel(axis, place, [d for d in self.doors if inside and (d.axis, d.room) == (axis, below)])
+                )
+        return found
+
+    def _panel(self, axis: int, place: Point, doors: list[Door]) -> tuple[list[Box], list[Box]]:
+        """A wall in pieces, cut along all edges of its doors."""
+        low = np.array(place) * MODULE + WALL // 2
+        low[axis] -= WALL
+        high = low + WALL
+        u, v = (i for i in range(3) if i != axis)
+        us, vs = (sorted({0, MODULE - WALL, *(c for d in doors for c in (d.low[i], d.high[i]))}) for i in range(2))
+        solid, open_ = [], []
+        for (a, b), (c, d) in product(pairwise(us), pairwise(vs)):
+            start, end = low.copy(), high.copy()
+            start[[u, v]], end[[u, v]] = low[[u, v]] + (a, c), low[[u, v]] + (b, d)
+            through = any(h.low[0] <= a and b <= h.high[0] and h.low[1] <= c and d <= h.high[1] for h in doors)
+            (open_ if through else solid).append(_box(start, end))
+        return solid, open_
+
+    @cached_property
+    def scene(self) -> Scene:
+        """Walls as occluders, furniture as detail, rooms as spaces."""
+        shape = Definition("box", (Mesh(CORNERS.astype(float), FACES),))
+        parts = [(box, f"wall {n}", Role.OCCLUDER) for n, box in enumerate(self.solids)]
+        parts += [(box, f"furniture {n}", Role.DETAIL) for n, box in enumerate(self.furniture)]
+        objects = []
+        for (low, high), name, role in parts:
+            transform = np.eye(4)
+            transform[:3, :3] = np.diag(np.subtract(high, low) * GRID_M)
+            transform[:3, 3] = np.array(low) * GRID_M
+            objects.append(Instance(name, "box", 0, transform, role))
+        spaces = []
+        for place in product(*map(range, self.rooms)):
+            low, high = self.room(place)
+            spaces.append(Space(f"room {place}", (low + CORNERS * (high - low)) * GRID_M, FACES))
+        return Scene([shape], objects, spaces, source=repr(self))
+
+    @cached_property
+    def view_cells(self) -> dict[str, list]:
+        """One view cell a room [m], as a table that `viewcell.check` takes."""
+        boxes = [self.room(place) * GRID_M for place in product(*map(range, self.rooms))]
+        columns = {"cell_id": list(range(len(boxes)))}
+        for side, end in enumerate(("min", "max")):
+            columns |= {f"{end}_{axis}": [float(box[side, i]) for box in boxes] for i, axis in enumerate("xyz")}
+        return columns
+
+    def graph(self) -> CellGraph:
+        """Rooms and doorways as a bare cell graph, all cells inhabitable."""
+        cells = [self.room(place) for place in product(*map(range, self.rooms))]
+        cells += [np.array(box) for panel in self._panels() for box in panel[1]]
+        graph = find_portals(np.array(cells, np.int32), OpaquePlanes([np.zeros((0, 2, 3), np.int32)] * 3, 0.0, 0.0))
+        graph.inhabitable[:] = True
+        return graph
+
+
+def _box(low: np.ndarray, high: np.ndarray) -> Box:
+    return tuple(low.tolist()), tuple(high.tolist())
+
+
+@st.composite
+def portal_sequences(draw: st.DrawFn, most: int = 8, size: int = 2_000) -> PortalSequence:
+    """Boxes near a common line: each has an edge or a corner within two steps of it, and the line may miss some.
+
+    Args:
+        draw: of Hypothesis.
+        most: boxes at most.
+        size: of the scene [grid steps].
+    """
+    signs = draw(st.tuples(*[st.sampled_from((1, -1))] * 3))
+    way = [draw(st.integers(1, 9)) * sign for sign in signs]
+    count = draw(st.integers(2, most))
+    times = sorted(draw(st.lists(st.integers(0, size // 10), min_size=count, max_size=count, unique=True)))
+    boxes = []
+    for time in times:
+        flat = draw(st.integers(0, 3))
+        low, high = [0, 0, 0], [0, 0, 0]
+        for axis in range(3):
+            at = time * way[axis]
+            # The line passes this far inside the box, on one side or the other; 0 is its edge.
+            inside, extent = draw(NEAR), draw(st.integers(0, size // 20))
+            ends = (at - inside, at - inside + extent) if draw(st.booleans()) else (at + inside - extent, at + inside)
+            low[axis], high[axis] = (at, at) if axis == flat else ends
+        boxes.append((tuple(low), tuple(high)))
+    return PortalSequence(tuple(boxes), signs)
+
+
+@st.composite
+def occluded_pairs(draw: st.DrawFn, most: int = 4, size: int = 40) -> OccludedPair:
+    """Walls across the way from a cell to a rectangle beyond, each in pieces that share an edge or leave a slit.
+
+    Args:
+        draw: of Hypothesis.
+        most: walls at most; each is one, two or four polygons.
+        size: of the scene [grid steps].
+    """
+    small = st.integers(1, size // 4)
+    cell = ((0, 0, 0), (draw(small), draw(small), draw(small)))
+    far = size + draw(small)
+    start = (draw(st.integers(-size // 4, size // 4)), draw(st.integers(-size // 4, size // 4)))
+    end = (start[0] + draw(small), start[1] + draw(small))
+    target = ((far, start[0], start[1]), (far, end[0], start[1]), (far, end[0], end[1]), (far, start[0], end[1]))
+    occluders = []
+    for _ in range(draw(st.integers(0, most))):
+        at = draw(st.integers(cell[1][0], far))
+        # Where the outermost lines from cell to target cross the wall's plane: edges lie within two steps of them.
+        share = Fraction(at - cell[1][0], far - cell[1][0]) if far > cell[1][0] else Fraction(0)
+        low = [int(share * start[i]) - draw(st.integers(0, 2)) for i in range(2)]
+        high = [round(cell[1][1 + i] + share * (end[i] - cell[1][1 + i])) + draw(st.integers(0, 2)) for i in range(2)]
+        high = [max(a + 1, b) for a, b in zip(low, high, strict=True)]
+        us, vs = [(low[0], high[0])], [(low[1], high[1])]
+        gap = draw(st.integers(0, 1))
+        for spans, axis in ((us, 0), (vs, 1)):
+            if draw(st.booleans()) and high[axis] - low[axis] > 2 + gap:
+                cut = draw(st.integers(low[axis] + 1, high[axis] - 1 - gap))
+                spans[:] = [(low[axis], cut), (cut + gap, high[axis])]
+        # A wall may lean: its upper edge is moved along x.
+        lean = draw(NEAR) if len(us) == len(vs) == 1 else 0
+        for (a, b), (c, d) in product(us, vs):
+            occluders.append(((at, a, c), (at, b, c), (at + lean, b, d), (at + lean, a, d)))
+    return OccludedPair(cell, target, tuple(occluders))
+
+
+@st.composite
+def knapsacks(draw: st.DrawFn, groups: int = 6, levels: int = 4) -> Knapsack:
+    """Level choices with ties, dominated and identical objects, and budgets at the edge of what fits.
+
+    Args:
+        draw: of Hypothesis.
+        groups: objects at most.
+        levels: of each at most.
+    """
+    count = draw(st.integers(1, groups))
+    shapes = []
+    for number in range(count):
+        if number and draw(st.booleans()):
+            # Instances of one shape switch at the same price; that breaks plain bisection.
+            shapes.append(shapes[draw(st.integers(0, number - 1))])
+            continue
+        size = draw(st.integers(1, levels))
+        costs = sorted(draw(st.lists(st.integers(0, 30), min_size=size, max_size=size)))
+        benefits = sorted(draw(st.lists(st.integers(0, 1000), min_size=size, max_size=size)))
+        shapes.append((tuple(benefits), tuple(costs)))
+    least = sum(min(costs) for _, costs in shapes)
+    whole = sum(max(costs) for _, costs in shapes)
+    budget = draw(st.one_of(st.integers(0, whole + 1), st.sampled_from([least - 1, least, whole - 1, whole])))
+    return Knapsack(tuple(b for b, _ in shapes), tuple(c for _, c in shapes), max(0, budget))
+
+
+@st.composite
+def buildings(draw: st.DrawFn, columns: int = 3, rows: int = 2, storeys: int = 1, furniture: int = 2) -> Building:
+    """Rooms with doors that line up, or miss each other by a step or two, and furniture near the edges of doors.
+
+    Args:
+        draw: of Hypothesis.
+        columns: at most.
+        rows: at most.
+        storeys: at most.
+        furniture: pieces at most.
+    """
+    rooms = (draw(st.integers(1, columns)), draw(st.integers(1, rows)), draw(st.integers(1, storeys)))
+    inner, doors = MODULE - WALL, []
+    # All doors of a building are about two places, from which they differ by a step or two.
+    places = [draw(st.integers(0, inner // 2)) for _ in range(2)]
+    for place in product(*map(range, rooms)):
+        for axis in range(3):
+            if place[axis] + 1 < rooms[axis] and draw(st.integers(0, 3)):
+                low, high = [], []
+                for _ in range(2):
+                    first = min(max(0, draw(st.sampled_from(places)) + draw(NEAR)), inner - 1)
+                    width = draw(st.sampled_from((1, 2, 64, inner // 3)))
+                    low.append(first)
+                    high.append(min(inner, first + width))
+                doors.append(Door(place, axis, tuple(low), tuple(high)))
+    boxes = []
+    for _ in range(draw(st.integers(0, furniture))):
+        room = tuple(draw(st.integers(0, n - 1)) for n in rooms)
+        corner, box = WALL // 2 + np.array(room) * MODULE, ([], [])
+        for axis in range(3):
+            first = min(max(0, draw(st.sampled_from(places)) + draw(NEAR)), inner - 2)
+            box[0].append(int(corner[axis]) + first)
+            box[1].append(int(corner[axis]) + min(inner, first + draw(st.sampled_from((1, 40, 300)))))
+        boxes.append((tuple(box[0]), tuple(box[1])))
+    return Building(rooms, tuple(doors), tuple(boxes))
