@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise, product
+from math import ceil, floor
 
 import numpy as np
 
@@ -252,9 +253,12 @@ def occluded_pairs(draw: st.DrawFn, most: int = 4, size: int = 40) -> OccludedPa
     for _ in range(draw(st.integers(0, most))):
         at = draw(st.integers(cell[1][0], far))
         # Where the outermost lines from cell to target cross the wall's plane: edges lie within two steps of them.
-        share = Fraction(at - cell[1][0], far - cell[1][0]) if far > cell[1][0] else Fraction(0)
-        low = [int(share * start[i]) - draw(st.integers(0, 2)) for i in range(2)]
-        high = [round(cell[1][1 + i] + share * (end[i] - cell[1][1 + i])) + draw(st.integers(0, 2)) for i in range(2)]
+        shares = [Fraction(at - x, far - x) if far > x else Fraction(0) for x in (0, cell[1][0])]
+        low = [floor(min(s * start[i] for s in shares)) - draw(st.integers(-1, 2)) for i in range(2)]
+        high = [
+            ceil(max(cell[1][1 + i] + s * (end[i] - cell[1][1 + i]) for s in shares)) + draw(st.integers(-1, 2))
+            for i in range(2)
+        ]
         high = [max(a + 1, b) for a, b in zip(low, high, strict=True)]
         us, vs = [(low[0], high[0])], [(low[1], high[1])]
         gap = draw(st.integers(0, 1))
@@ -327,6 +331,6 @@ def buildings(draw: st.DrawFn, columns: int = 3, rows: int = 2, storeys: int = 1
         for axis in range(3):
             first = min(max(0, draw(st.sampled_from(places)) + draw(NEAR)), inner - 2)
             box[0].append(int(corner[axis]) + first)
-            box[1].append(int(corner[axis]) + min(inner, first + draw(st.sampled_from((1, 40, 300)))))
+            box[1].append(int(corner[axis]) + min(inner, first + draw(st.sampled_from((1, 40, 300, 800)))))
         boxes.append((tuple(box[0]), tuple(box[1])))
     return Building(rooms, tuple(doors), tuple(boxes))
