@@ -7,8 +7,10 @@ import numpy as np
 from ..data.blockers import Blockers
 from ..data.database import VisibleRows
 from ..data.graph import CellGraph
+from ..data.hierarchy import build_levels
 from ..data.solids import SolidIndex
 from .graph import device_graph
+from .ledger import Ledger, descend
 from .sightline import AimTargets, Triangles, launch_aim, launch_confirm
 from .target import TargetAnswers, blocker_tree, launch_target_search
 from .walk import launch_walk
@@ -19,6 +21,8 @@ AIM_ROUNDS = (16, 64, 256)
 REFUSED_AGAIN = 3
 # Lines tried for a pair, then again for what stayed undecided.
 CAPS = (200, 20_000)
+# Lines tried for a group of cells, and where the groups start: the root is visible from everywhere.
+GROUP_CAP, FIRST_LEVEL = 40, 3
 
 
 @dataclass
@@ -99,23 +103,53 @@ def search_rounds(model: Model, boxes: np.ndarray, rows: np.ndarray) -> TargetAn
     return answers
 
 
-def cell_rows(model: Model, sources: np.ndarray, aim_rounds: tuple[int, ...] = AIM_ROUNDS) -> CellRows:
+def certified_pairs(model: Model, sources: np.ndarray, ledger: Ledger) -> np.ndarray:
+    """(source, other cell) pairs that no proof for a group of cells hides, shape (n, 2), int64."""
+    cells, options = model.graph.cells, {"threads": model.threads, "device": model.device}
+
+    def hide(source: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+        everything = np.concatenate([cells, boxes])
+        rows = np.column_stack([source, len(cells) + np.arange(len(boxes)), np.zeros(len(boxes), int)])
+        answers = launch_target_search(model.tree, everything, rows, cap=GROUP_CAP, **options)
+        ledger.add_lines(model.tree, everything, rows, answers, **options)
+        return answers.verdict == 0
+
+    pairs = np.column_stack(descend(cells, sources, *build_levels(cells), FIRST_LEVEL, hide))
+    return pairs[pairs[:, 0] != pairs[:, 1]]
+
+
+def search_pairs(model: Model, pairs: np.ndarray, ledger: Ledger | None) -> tuple[np.ndarray, TargetAnswers]:
+    """Rows of a target search between cells, and its answers."""
+    rows = np.column_stack([pairs, np.zeros(len(pairs), int)])
+    answers = search_rounds(model, model.graph.cells, rows)
+    if ledger is not None:
+        options = {"threads": model.threads, "device": model.device}
+        ledger.add_lines(model.tree, model.graph.cells, rows, answers, **options)
+    return rows, answers
+
+
+def cell_rows(
+    model: Model, sources: np.ndarray, aim_rounds: tuple[int, ...] = AIM_ROUNDS, ledger: Ledger | None = None
+) -> CellRows:
     """Every cell that is not proved hidden from the sources, itself included.
 
     Args:
         model: the model.
         sources: cells, shape (n,), int.
         aim_rounds: sightlines shot at each pair that still lacks a witness, round by round.
+        ledger: where to enter certificates; then only what has one is hidden.
 
     Returns:
         Reached pairs. A pair that is left out is hidden, exactly; `seen` pairs have a witness that clears every opaque
         triangle and starts outside every solid.
     """
     cells = model.graph.cells
-    pairs = np.stack(np.meshgrid(sources, np.arange(len(cells)), indexing="ij"), axis=-1).reshape(-1, 2)
-    own = pairs[:, 0] == pairs[:, 1]
-    rows = np.column_stack([pairs[~own], np.zeros((~own).sum(), int)])
-    answers = search_rounds(model, cells, rows)
+    if ledger is None:
+        pairs = np.stack(np.meshgrid(sources, np.arange(len(cells)), indexing="ij"), axis=-1).reshape(-1, 2)
+        pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    else:
+        pairs = certified_pairs(model, sources, ledger)
+    rows, answers = search_pairs(model, pairs, ledger)
     kept = np.flatnonzero(answers.verdict != 0)
     source, target = rows[kept, 0], rows[kept, 1]
     origin, end = np.zeros((len(kept), 3)), np.zeros((len(kept), 3))

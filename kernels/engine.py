@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 
 from ..data.blockers import Blockers, find_blockers
+from ..data.certificates import Proofs
 from ..data.database import VisibleRows
 from ..data.graph import CellGraph
 from ..data.incidence import populate
@@ -17,11 +18,21 @@ from ..data.patches import Patches, find_patches
 from ..data.regions import Regions, find_regions
 from ..data.scene import Role, Scene
 from ..data.solids import SolidIndex, closed_elements
-from . import cell_visibility, flood, object_visibility, occlusion, shaft, sightline, target, walk
-from .cell_visibility import CellRows, Model, cell_rows, join_rows, portal_rows, search_rounds, segments
+from . import cell_visibility, flood, line_tree, object_visibility, occlusion, shaft, sightline, target, walk
+from .cell_visibility import (
+    CellRows,
+    Model,
+    cell_rows,
+    certified_pairs,
+    join_rows,
+    portal_rows,
+    search_pairs,
+    segments,
+)
 from .flood import launch_flood
+from .ledger import Ledger
 from .object_visibility import ObjectModel, ObjectRows, object_rows
-from .occlusion import Ledger, Occlusion, Proofs, device_occluders, hidden_boxes, refine_objects, seen_objects
+from .occlusion import Occlusion, device_occluders, hidden_boxes, refine_objects, seen_objects
 from .sightline import AimTargets, Triangles, aim_targets, device_triangles
 from .target import TargetAnswers
 
@@ -35,9 +46,6 @@ PATCH_SHARE = 1 / 32
 # View cells and pieces are not halved below this, and a proof has at most so many pieces.
 SMALLEST_M = (0.0625, 0.0625)
 SHAFT_CAP = 200
-# With certificates, which shafts alone prove, and which every halving makes longer.
-CERTIFIED_M = (0.25, 0.25)
-CERTIFIED_CAP = 2000
 # With "auto" the occluders are asked about cells of whose potential objects more than this share is unknown.
 AUTO_UNKNOWN = 0.02
 NO_PLANES = OpaquePlanes([np.zeros((0, 2, 3), np.int32)] * 3, 0.0, 0.0)
@@ -133,6 +141,7 @@ class Engine:
         threads: int,
         device: str,
         method: str = "portals",
+        certify: bool = False,
     ) -> None:
         """Copy what visibility needs to the device.
 
@@ -145,7 +154,11 @@ class Engine:
             device: Warp device.
             method: "portals"; "both" to ask the occluders about every pair that portals leave unknown; "auto" to ask
                 only where much is unknown. Without effect on a bare graph.
+            certify: call hidden only what has a certificate, and keep it. On a model all methods then hide by its
+                occluders, which can be checked against the model alone; "portals" leaves out oblique ones for cells.
         """
+        self._certify = certify
+        self.occluders: tuple[Blockers, Regions | None, Patches | None] | None = None
         self.objects = None
         self.object_count = 0
         self._scene = scene
@@ -154,11 +167,17 @@ class Engine:
         if scene is None:
             blockers = find_blockers(graph)
             self.model = Model(graph, blockers, None, None, None, device, threads, seed)
+            self.occluders = blockers, None, None
             return
         self._sights = sights = Sights(scene, opaque, graph.cells, device)
         self.object_count = len(scene.objects)
         self.objects = ObjectModel(populate(scene, graph.cells), sights.ranges)
-        blockers = find_blockers(graph, sights.opaque)
+        if certify:
+            self.occlusion, shadows = sights.occlusion(scene, graph.cells, seed, threads, device)
+            self.occluders = region_blockers(shadows[0]), *shadows
+            blockers = self.occluders[0]
+        else:
+            blockers = find_blockers(graph, sights.opaque)
         self.model = Model(graph, blockers, sights.triangles, sights.targets, sights.solids, device, threads, seed)
 
     @cached_property
@@ -172,6 +191,8 @@ class Engine:
         modules = [target, walk, sightline] if self.objects is not None else [target, walk, flood]
         if self.objects is not None and self._least_unknown == 0.0:
             modules.append(shaft)
+        if self._certify:
+            modules += [line_tree] if self.objects is None else [line_tree, shaft]
         for module in modules:
             wp.load_module(module.__name__, device=self.model.device)
 
@@ -183,6 +204,8 @@ class Engine:
             aim: shoot at what the axial model allows but whose own line the true triangles stop. Without it the same
                 pairs are hidden, in a fraction of the time, and more of the others stay unknown.
         """
+        if self._certify:
+            return self._certified(block, aim)
         if self.objects is None:
             return Part(self._flood(block), no_objects())
         rounds = (cell_visibility.AIM_ROUNDS, object_visibility.AIM_ROUNDS) if aim else ((), ())
@@ -195,17 +218,33 @@ class Engine:
             objects = self._refine(objects, doubtful, aim)
         return Part(cells, objects)
 
+    def _certified(self, block: np.ndarray, aim: bool) -> Part:
+        """As `visible`, with a certificate of all that is hidden."""
+        ledger = Ledger()
+        if self.objects is None:
+            left = np.zeros((self.model.graph.cell_count,) * 2, bool)
+            left[tuple(certified_pairs(self.model, block, ledger).T)] = True
+            # What is hidden from the other end is hidden.
+            left[:, block] &= left[block].T
+            cells = self._search_cells(block, np.argwhere(left), [], ledger)
+            return Part(cells, no_objects(), ledger.close(np.zeros(0, bool)))
+        cells = cell_rows(self.model, block, cell_visibility.AIM_ROUNDS if aim else (), ledger)
+        if self._least_unknown == 0.0:
+            cells = self._hide_cells(cells, ledger)
+        return Part(cells, *seen_objects(self.occlusion, block, occlusion.AIM_ROUNDS if aim else (), ledger))
+
     def _unknown_sources(self, rows: ObjectRows) -> np.ndarray:
         """Cells of whose potential objects so many are unknown that the occluders are asked, shape (cells,), bool."""
         count = self.model.graph.cell_count
         unknown = np.bincount(rows.source[~rows.seen], minlength=count)
         return unknown > np.minimum(self._least_unknown, 1.0) * np.bincount(rows.source, minlength=count)
 
-    def _hide_cells(self, rows: CellRows) -> CellRows:
+    def _hide_cells(self, rows: CellRows, ledger: Ledger | None = None) -> CellRows:
         """Rows without the unknown cells that occluders hide."""
         todo = np.flatnonzero(~rows.seen & (rows.source != rows.target))
         hidden = np.zeros(len(rows.source), bool)
-        hidden[todo] = hidden_boxes(self.occlusion, rows.source[todo], self.model.graph.cells[rows.target[todo]])
+        boxes = self.model.graph.cells[rows.target[todo]]
+        hidden[todo] = hidden_boxes(self.occlusion, rows.source[todo], boxes, ledger)
         # Only rows with a witness have portals.
         columns = [column[~hidden] for column in (rows.source, rows.target, rows.seen, rows.origin, rows.end)]
         return CellRows(*columns, rows.portal_counts[~hidden], rows.portals)
@@ -265,20 +304,26 @@ class Engine:
                 # Half the octants prove a pair hidden only together with the other end's half.
                 state[(state == 2) & (state.T == 0)] = 0
         todo = np.argwhere(state == 0)
-        once = (row_of[todo[:, 1]] < 0) | (sources[todo[:, 0]] < todo[:, 1])
-        todo = todo[once]
-        rows = np.column_stack([sources[todo[:, 0]], todo[:, 1], np.zeros(len(todo), int)])
-        answers = search_rounds(model, model.graph.cells, rows)
+        return self._search_cells(sources, np.column_stack([sources[todo[:, 0]], todo[:, 1]]), lines)
+
+    def _search_cells(
+        self, sources: np.ndarray, pairs: np.ndarray, lines: list[tuple], ledger: Ledger | None = None
+    ) -> CellRows:
+        """Rows of a bare graph from some lines and a target search of the pairs that may have more."""
+        row_of = np.full(self.model.graph.cell_count, -1)
+        row_of[sources] = np.arange(len(sources))
+        once = (row_of[pairs[:, 1]] < 0) | (pairs[:, 0] < pairs[:, 1])
+        rows, answers = search_pairs(self.model, pairs[once], ledger)
         kept = np.flatnonzero(answers.verdict == 1)
         taken = TargetAnswers(None, None, answers.octant[kept], answers.line[kept], answers.offset[kept])
-        lines.append(self._lines(taken, rows[kept, 0], rows[kept, 1]))
+        lines = [*lines, self._lines(taken, rows[kept, 0], rows[kept, 1])]
         doubtful = np.flatnonzero(answers.verdict == 2)
         lines.append((rows[doubtful, 0], rows[doubtful, 1], np.zeros((len(doubtful), 3)), np.zeros((len(doubtful), 3))))
         source, reached, origin, end = (np.concatenate(column) for column in zip(*lines, strict=True))
         back = row_of[reached] >= 0
         source, reached = np.concatenate([source, reached[back]]), np.concatenate([reached, source[back]])
         origin, end = np.concatenate([origin, end[back]]), np.concatenate([end, origin[back]])
-        return portal_rows(model, sources, source, reached, origin, end)
+        return portal_rows(self.model, sources, source, reached, origin, end)
 
     def _lines(
         self, answers: TargetAnswers, source: np.ndarray, reached: np.ndarray
@@ -315,16 +360,16 @@ class ViewCellEngine:
             device: Warp device.
             method: "occluders"; "portals", "both" to hide what no line between live cells of `portal_graph` reaches.
             portal_graph: cells and portals of the model.
-            certify: call hidden only what has a certificate, and keep it.
+            certify: call hidden only what has a certificate, and keep it; all methods then hide by occluders alone.
         """
         self._certify = certify
         self.object_count = len(scene.objects)
         self._solids = closed_elements(scene)
         sights = Sights(scene, opaque, graph.cells, device)
-        blockers = None if portal_graph is None else find_blockers(portal_graph, sights.opaque)
-        self.model, self.occluders = sights.occlusion(
-            scene, graph.cells, seed, threads, device, blockers, method != "portals"
-        )
+        blockers = None if portal_graph is None or certify else find_blockers(portal_graph, sights.opaque)
+        shadows = method != "portals" or certify
+        self.model, found = sights.occlusion(scene, graph.cells, seed, threads, device, blockers, shadows)
+        self.occluders = region_blockers(found[0]), *found
 
     def with_cells(self, cells: np.ndarray) -> "ViewCellEngine":
         """The same engine for other view cells [grid steps], shape (n, 2, 3), int32."""
@@ -334,7 +379,7 @@ class ViewCellEngine:
 
     def compile(self) -> None:
         """Load the kernels, so that their compilation is not counted as visibility."""
-        for module in (target, shaft, sightline):
+        for module in (target, shaft, sightline, *([line_tree] if self._certify else [])):
             wp.load_module(module.__name__, device=self.model.device)
 
     def visible(self, block: np.ndarray, *, aim: bool = True) -> Part:
@@ -364,23 +409,13 @@ def relabelled(part: Part, places: np.ndarray) -> Part:
     rows, proofs = part.objects, part.proofs
     kept = np.flatnonzero(places[rows.source] >= 0)
     columns = [column[kept] for column in (rows.target, rows.seen, rows.origin, rows.end)]
-    if proofs is not None:
-        wanted = places[proofs.cell] >= 0
-        sizes = np.diff(proofs.starts)
-        starts = np.concatenate([[0], np.cumsum(sizes[wanted])])
-        leaves = proofs.leaves[np.repeat(wanted, sizes)]
-        proofs = Proofs(places[proofs.cell[wanted]], proofs.boxes[wanted], starts, leaves)
+    proofs = None if proofs is None else proofs.relabelled(places)
     return Part(None, ObjectRows(places[rows.source[kept]], *columns), proofs)
 
 
-def join_proofs(parts: list[Part]) -> Proofs | None:
-    """Proofs of all blocks; None if none were kept."""
-    found = [part.proofs for part in parts if part.proofs is not None]
-    if not found:
-        return None
-    sizes = np.concatenate([np.diff(proofs.starts) for proofs in found])
-    cell, boxes, leaves = (np.concatenate([getattr(p, name) for p in found]) for name in ("cell", "boxes", "leaves"))
-    return Proofs(cell, boxes, np.concatenate([[0], np.cumsum(sizes)]), leaves)
+def region_blockers(regions: Regions) -> Blockers:
+    """Rectangles of regions as the target search wants them."""
+    return Blockers(regions.boxes, regions.axis[regions.region], regions.hierarchy)
 
 
 def join_objects(parts: list[Part]) -> VisibleRows:

@@ -14,12 +14,14 @@ from functools import partial
 import numpy as np
 
 from ..data.blockers import Blockers
+from ..data.certificates import Proofs
 from ..data.hierarchy import build_hierarchy
 from ..data.occludees import Occludees
 from ..data.patches import Patches
 from ..data.regions import Regions
 from ..data.solids import SolidIndex
 from .cell_visibility import segments
+from .ledger import Ledger, apart, descend
 from .object_visibility import ObjectRows, aim_at_objects
 from .shaft import ShaftAnswers, Shields, device_shields, launch_shaft, patches_met
 from .sightline import AimTargets, Triangles
@@ -34,45 +36,6 @@ FIRST_LEVEL = 3
 NODE_CAP, PIECE_CAP = 40, 2000
 # An object with so many pieces that could not be hidden is not looked at further: they are enough to aim at.
 OPEN_ENOUGH = 3
-
-
-@dataclass
-class Proofs:
-    """Certificates of what is hidden.
-
-    Attributes:
-        cell: view cell of each proof, shape (n,), int64.
-        boxes: what is hidden from it, whatever lies inside [grid steps], shape (n, 2, 3), int32.
-        starts: leaves of proof i are leaves[starts[i]:starts[i + 1]], shape (n + 1,), int64.
-        leaves: as ShaftAnswers.certificate, shape (leaves, 13), int32.
-    """
-
-    cell: np.ndarray
-    boxes: np.ndarray
-    starts: np.ndarray
-    leaves: np.ndarray
-
-
-class Ledger:
-    """Collects proofs; with one, only what has a certificate is called hidden."""
-
-    def __init__(self) -> None:
-        self._entries: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
-
-    def add(self, pair: np.ndarray, cell: np.ndarray, boxes: np.ndarray, answers: ShaftAnswers) -> None:
-        """Enter the proofs of a run; `pair` is what each box is a piece of, -1 if it is whole."""
-        hidden = np.flatnonzero(answers.verdict == 0)
-        sizes = answers.leaves[hidden]
-        self._entries.append((pair[hidden], cell[hidden], boxes[hidden], sizes, answers.certificate))
-
-    def close(self, hidden: np.ndarray) -> Proofs:
-        """All proofs, without those of pieces of pairs that are not hidden; `hidden` is by pair, bool."""
-        none = np.zeros(0, int)
-        entries = [*self._entries, (none, none, np.zeros((0, 2, 3), np.int32), none, np.zeros((0, 13), np.int32))]
-        pair, cell, boxes, sizes, leaves = (np.concatenate(column) for column in zip(*entries, strict=True))
-        wanted = (pair < 0) | np.append(hidden, False)[pair]
-        starts = np.concatenate([[0], np.cumsum(sizes[wanted])])
-        return Proofs(cell[wanted], boxes[wanted], starts, leaves[np.repeat(wanted, sizes)])
 
 
 @dataclass
@@ -127,17 +90,19 @@ def seen_objects(
         model: occluders and occludees.
         block: view cells, shape (n,), int.
         aim_rounds: sightlines shot at what could not be hidden.
-        ledger: where to enter certificates; then only what has one is hidden, which is less.
+        ledger: where to enter certificates; then only what has one is hidden.
 
     Returns:
         Reached pairs. A pair that is left out is hidden from every point of the cell outside solids, exactly. A `seen`
         pair's witness ends on the object, starts outside every solid, and clears all opaque triangles but the object's.
         And the certificates, with a ledger.
     """
-    source, target = descend(model, block, ledger)
+    occludees = model.occludees
+    hide = partial(_hide_nodes, model, ledger)
+    source, target = descend(model.cells, block, occludees.levels, occludees.objects, FIRST_LEVEL, hide)
     count = len(source)
     rows = ObjectRows(source, target, np.zeros(count, bool), np.zeros((count, 3)), np.zeros((count, 3)))
-    bounds = model.occludees.bounds[target]
+    bounds = occludees.bounds[target]
     middles = np.stack([model.cells[source].mean(axis=1), bounds.mean(axis=1)], axis=1)
     aim_at_objects(model, model.cells, model.ranges, rows, np.arange(count), bounds, middles, target, FIRST_TRIES, 0)
     return refine_objects(model, rows, aim_rounds, ledger)
@@ -161,66 +126,52 @@ def refine_objects(
     return ObjectRows(rows.source[kept], rows.target[kept], rows.seen[kept], rows.origin[kept], rows.end[kept]), proofs
 
 
-def hidden_boxes(model: Occlusion, source: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+def hidden_boxes(model: Occlusion, source: np.ndarray, boxes: np.ndarray, ledger: Ledger | None = None) -> np.ndarray:
     """Boxes that no sightline from the view cell of their row reaches, shape (n,), bool; false proves nothing."""
     hidden = np.zeros(len(source), bool)
-    apart = _apart(model.cells[source], boxes)
-    hidden[apart] = _shaft(model, source[apart], boxes[apart]).verdict == 0
+    rows = apart(model.cells[source], boxes)
+    hidden[rows] = _shaft(model, source[rows], boxes[rows], ledger).verdict == 0
     return hidden
 
 
-def descend(model: Occlusion, block: np.ndarray, ledger: Ledger | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """(view cell, object) pairs that no proof for a box around the object, or around several, hides; ordered."""
-    levels = model.occludees.levels
-    level = min(FIRST_LEVEL, len(levels) - 1)
-    source = np.repeat(block, 2**level)
-    node = np.tile(np.arange(2**level), len(block))
-    while True:
-        boxes = levels[level][node]
-        present = (boxes[:, 0] <= boxes[:, 1]).all(axis=1)
-        source, node, boxes = source[present], node[present], boxes[present]
-        hidden = np.zeros(len(node), bool)
-        apart = _apart(model.cells[source], boxes)
-        if ledger is None:
-            hidden[apart] = _search(model, source[apart], boxes[apart], NODE_CAP).verdict == 0
-        else:
-            answers = _shaft(model, source[apart], boxes[apart], cap=NODE_CAP, certify=True)
-            ledger.add(np.full(len(apart), -1), source[apart], boxes[apart], answers)
-            hidden[apart] = answers.verdict == 0
-        source, node = source[~hidden], node[~hidden]
-        if level == len(levels) - 1:
-            break
-        level += 1
-        source, node = np.repeat(source, 2), (2 * node[:, None] + [0, 1]).ravel()
-    target = model.occludees.objects[node].astype(np.int64)
-    order = np.lexsort((target, source))
-    return source[order].astype(np.int64), target[order]
+def _hide_nodes(model: Occlusion, ledger: Ledger | None, source: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    """Which nodes of the hierarchy few lines hide, shape (n,), bool."""
+    return _search(model, source, boxes, NODE_CAP, ledger).verdict == 0
 
 
-def _apart(cells: np.ndarray, boxes: np.ndarray) -> np.ndarray:
-    """Rows whose open cell does not meet the closed box."""
-    meet = (cells[:, 0] < boxes[:, 1]) & (cells[:, 1] > boxes[:, 0])
-    # A flat box inside the cell has low == high, which lies strictly between the cell's sides.
-    return np.flatnonzero(~(meet[:, 0] & meet[:, 1] & meet[:, 2]))
-
-
-def _search(model: Occlusion, source: np.ndarray, boxes: np.ndarray, cap: int) -> TargetAnswers:
-    """Target search from view cells to boxes, row by row."""
+def _search(
+    model: Occlusion,
+    source: np.ndarray,
+    boxes: np.ndarray,
+    cap: int,
+    ledger: Ledger | None = None,
+    pair: np.ndarray | None = None,
+) -> TargetAnswers:
+    """Target search from view cells to boxes, row by row; `pair` as of `Ledger.add_lines`."""
     rows = np.column_stack([source, len(model.cells) + np.arange(len(boxes)), np.ones(len(boxes), int)])
     everything = np.concatenate([model.cells, boxes])
-    return launch_target_search(model.tree, everything, rows, cap=cap, threads=model.threads, device=model.device)
+    options = {"threads": model.threads, "device": model.device}
+    answers = launch_target_search(model.tree, everything, rows, cap=cap, **options)
+    if ledger is not None:
+        ledger.add_lines(model.tree, everything, rows, answers, pair, **options)
+    return answers
 
 
 def _shaft(
-    model: Occlusion, source: np.ndarray, boxes: np.ndarray, cap: int | None = None, *, certify: bool = False
+    model: Occlusion,
+    source: np.ndarray,
+    boxes: np.ndarray,
+    ledger: Ledger | None = None,
+    pair: np.ndarray | None = None,
 ) -> ShaftAnswers:
     """Shaft test from view cells to boxes, row by row."""
     rows = np.column_stack([source, len(model.cells) + np.arange(len(boxes))])
     everything = np.concatenate([model.cells, boxes])
-    options = {"threads": model.threads, "device": model.device}
-    return launch_shaft(
-        model.shields, everything, rows, smallest=model.smallest, cap=cap or model.cap, certify=certify, **options
-    )
+    options = {"certify": ledger is not None, "threads": model.threads, "device": model.device}
+    answers = launch_shaft(model.shields, everything, rows, smallest=model.smallest, cap=model.cap, **options)
+    if ledger is not None:
+        ledger.add_shafts(source, boxes, answers, pair)
+    return answers
 
 
 def _prove_pieces(
@@ -245,8 +196,7 @@ def _prove_pieces(
         at = np.repeat(active, sizes)
         ends = np.cumsum(sizes)
         piece = first[at] + np.arange(len(at)) - np.repeat(ends - sizes, sizes)
-        prove = _prove_boxes if ledger is None else partial(_certify_boxes, ledger=ledger, pair=pairs[at])
-        left, hints = prove(model, rows.source[pairs[at]], model.occludees.pieces[piece])
+        left, hints = _prove_boxes(model, rows.source[pairs[at]], model.occludees.pieces[piece], ledger, pairs[at])
         found.append((pairs[at[left]], piece[left], hints[left]))
         np.add.at(open_pieces, at[left], 1)
         first[active] += sizes
@@ -256,37 +206,24 @@ def _prove_pieces(
     return tuple(np.concatenate(column) for column in zip(*found, strict=True))
 
 
-def _prove_boxes(model: Occlusion, source: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _prove_boxes(
+    model: Occlusion, source: np.ndarray, boxes: np.ndarray, ledger: Ledger | None, pair: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Which boxes could not be hidden from the view cell of their row, bool, and a line to each, shape (n, 2, 3)."""
     hints = np.stack([model.cells[source].mean(axis=1), boxes.mean(axis=1)], axis=1)
     left = np.ones(len(source), bool)
-    apart = _apart(model.cells[source], boxes)
-    answers = _search(model, source[apart], boxes[apart], PIECE_CAP)
-    left[apart[answers.verdict == 0]] = False
+    rows = apart(model.cells[source], boxes)
+    answers = _search(model, source[rows], boxes[rows], PIECE_CAP, ledger, pair[rows])
+    left[rows[answers.verdict == 0]] = False
     lined = np.flatnonzero(answers.verdict == 1)
-    at = apart[lined]
+    at = rows[lined]
     hints[at] = np.stack(segments(answers, lined, model.cells[source[at]], boxes[at]), axis=1)
     # A line past all rectangles that meets no oblique occluder either: there is nothing to prove.
-    at = apart[answers.verdict != 0]
+    at = rows[answers.verdict != 0]
     options = {"threads": model.threads, "device": model.device}
     at = at[patches_met(model.shields, hints[at, 0], hints[at, 1], **options)]
-    proofs = _shaft(model, source[at], boxes[at])
+    proofs = _shaft(model, source[at], boxes[at], ledger, pair[at])
     left[at[proofs.verdict == 0]] = False
     failed = proofs.verdict != 0
     hints[at[failed]] = proofs.middle[failed]
-    return left, hints
-
-
-def _certify_boxes(
-    model: Occlusion, source: np.ndarray, boxes: np.ndarray, *, ledger: Ledger, pair: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """As `_prove_boxes`, with a certificate for what is hidden."""
-    hints = np.stack([model.cells[source].mean(axis=1), boxes.mean(axis=1)], axis=1)
-    left = np.ones(len(source), bool)
-    apart = _apart(model.cells[source], boxes)
-    answers = _shaft(model, source[apart], boxes[apart], certify=True)
-    ledger.add(pair[apart], source[apart], boxes[apart], answers)
-    left[apart[answers.verdict == 0]] = False
-    failed = answers.verdict != 0
-    hints[apart[failed]] = answers.middle[failed]
     return left, hints

@@ -3,7 +3,19 @@ import importlib
 import pytest
 import warp as wp
 
-MODULES = ("flood", "target", "sightline", "walk", "shaft", "stab_batch", "coverage", "occludee", "backface", "shadow")
+MODULES = (
+    "flood",
+    "target",
+    "line_tree",
+    "sightline",
+    "walk",
+    "shaft",
+    "stab_batch",
+    "coverage",
+    "occludee",
+    "backface",
+    "shadow",
+)
 HOPPER = 90
 
 

@@ -168,7 +168,6 @@ def test_damaged_meshes_lose_occlusion_never_safety(damage, tmp_path):
     ("settings", "wanted"),
     [
         ({"method": "shadows"}, "method: expected auto"),
-        ({"method": "portals", "certify": True}, "certify: expected the method occluders"),
         ({"method": "occluders", "cell_size_m": 0.0}, "cell size"),
         ({"method": "occluders", "cell_size_m": 1e-3}, "cell size"),
         ({"depth": 40}, "depth"),

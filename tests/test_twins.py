@@ -13,6 +13,7 @@ TWINS = {
     # Both searches ask for pairs joined by a stabbing line; tests/random_buildings.py searches with the exact stab.
     "launch_flood": ("flood", "stab_exact.stab", "test_flood.py"),
     "launch_target_search": ("target", "stab_exact.stab", "test_flood.py"),
+    "launch_line_trees": ("line_tree", "line_certificate.hides", "test_line_certificate.py"),
     "launch_confirm": ("sightline", "sightline.Sightlines", "test_sightline_kernels.py"),
     "launch_aim": ("sightline", "sightline.Sightlines", "test_sightline_kernels.py"),
     "launch_walk": ("walk", "walk.portal_path", "test_walk.py"),

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .certified import Certified
 from .rays import Caster
-from .shaft_certificate import Certified
 from .witness import Confirmed, visible_rows
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..data.certificates import LEAVES, OCCLUDERS, PROOFS
+from ..data.certificates import BLOCKERS, CORNERS, LEAVES, NODE_STEP, OCCLUDERS, PROOFS, TREES
 from ..data.graph import OTHER_AXES
 from ..data.scene_folder import read_table
 from .guide import Hints
@@ -19,11 +19,11 @@ WIDTHS = 2.0 ** np.arange(14)
 CHUNK = 1 << 12
 # Places of the corners of a box, of V' (first row) and of X', in all pairs.
 ENDS = np.array(list(product(range(8), repeat=2))).T
-CORNERS = np.array(list(product((0, 1), repeat=3)))
+SIDES = np.array(list(product((0, 1), repeat=3)))
 
 
 def certificate_hints(bake: "Bake", sources: np.ndarray, count: int = 4096) -> Hints:
-    """Sightlines of the leaves that their occluder covers with the smallest margin.
+    """Sightlines of the leaves, and of the line trees of one blocker, that are covered with the smallest margin.
 
     The margin of a leaf is how far its sightlines pass from where the occluder ends. Rectangles of one region that
     overlap make it too large, and it is told to a factor of 2 for regions; a hint is only a hint.
@@ -34,24 +34,32 @@ def certificate_hints(bake: "Bake", sources: np.ndarray, count: int = 4096) -> H
         count: of hints at most.
 
     Returns:
-        For the leaves of these cells, by margin: a segment between corners of the leaf's boxes V' and X' that passes
-        near the occluder's outline.
+        For the leaves and trees of these cells, by margin: a segment between corners of the leaf's boxes V' and X', or
+        of cell and hidden box, that passes near the occluder's outline.
 
     Raises:
         InputError: a table is missing or lacks a column.
     """
-    names = (("proofs", PROOFS), ("leaves", LEAVES), ("occluders", OCCLUDERS))
-    proofs, leaves, occluders = (read_table(bake.folder / f"{name}.parquet", columns) for name, columns in names)
+    names = (("proofs", PROOFS), ("leaves", LEAVES), ("occluders", OCCLUDERS), ("blockers", BLOCKERS))
+    proofs, leaves, table, blockers = (read_table(bake.folder / f"{name}.parquet", columns) for name, columns in names)
     row_of = np.full(bake.graph.cell_count, -1)
     row_of[sources] = np.arange(len(sources))
-    cells = dict(zip(proofs["proof_id"].to_pylist(), proofs["cell_id"].to_pylist(), strict=True))
-    rows = row_of[np.array([cells[proof] for proof in leaves["proof_id"].to_pylist()], np.int64)]
+    places = {proof: place for place, proof in enumerate(proofs["proof_id"].to_pylist())}
+    cells = proofs["cell_id"].to_numpy()
+    alone = _alone(bake)
+    occluders = [*table.to_pylist(), *(_as_region(row) for row in blockers.to_pylist())]
+    of_leaf = np.array([places[proof] for proof in leaves["proof_id"].to_pylist()], np.int64)
+    of_tree = np.array([places[proof] for proof in alone], np.int64)
+    rows = row_of[cells[np.concatenate([of_leaf, of_tree])]]
     boxes = np.stack([leaves[name].to_numpy() for name in LEAVES[2:]], axis=1).reshape(-1, 2, 2, 3) / bake.grid_m
-    owner, margin = leaves["occluder_id"].to_numpy(), np.full(len(rows), np.inf)
+    targets = np.stack([proofs[name].to_numpy() for name in CORNERS], axis=1).reshape(-1, 2, 3)[of_tree] / bake.grid_m
+    boxes = np.concatenate([boxes, np.stack([bake.graph.cells[cells[of_tree]], targets], axis=1)])
+    owner = np.concatenate([leaves["occluder_id"].to_numpy(), -1 - np.array(list(alone.values()), np.int64)])
+    margin = np.full(len(rows), np.inf)
     origins, ends = np.zeros((2, len(rows), 3))
     order = np.argsort(owner, kind="stable")
     order = order[rows[order] >= 0]
-    for occluder in occluders.to_pylist():
+    for occluder in occluders:
         own = order[slice(*np.searchsorted(owner[order], [occluder["occluder_id"], occluder["occluder_id"] + 1]))]
         for first in range(0, len(own), CHUNK):
             part = own[first : first + CHUNK]
@@ -64,9 +72,25 @@ def certificate_hints(bake: "Bake", sources: np.ndarray, count: int = 4096) -> H
     return Hints(rows[best], origins[best], ends[best])
 
 
+def _alone(bake: "Bake") -> dict[int, int]:
+    """Blocker by proof of the line trees that name a single one."""
+    trees = read_table(bake.folder / "trees.parquet", TREES)
+    blockers = [{word // NODE_STEP for word in words if word >= 0} for words in trees["words"].to_pylist()]
+    proofs = trees["proof_id"].to_pylist()
+    return {proof: min(named) for proof, named in zip(proofs, blockers, strict=True) if len(named) == 1}
+
+
+def _as_region(row: dict) -> dict:
+    """A row of blockers.parquet like one of occluders.parquet; blocker b has the id -1 - b."""
+    rectangles = [row[name] for name in BLOCKERS[3:]]
+    return {"occluder_id": -1 - row["blocker_id"], "kind": "region", "rectangles": rectangles} | {
+        name: row[name] for name in ("axis", "coordinate")
+    }
+
+
 def corners_of(boxes: np.ndarray) -> np.ndarray:
     """The eight corners of boxes of shape (n, 2, 3), shape (n, 8, 3)."""
-    return boxes[:, CORNERS, np.arange(3)]
+    return boxes[:, SIDES, np.arange(3)]
 
 
 def region_margin(p: np.ndarray, q: np.ndarray, region: dict, grid_m: float) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,7 @@ import pyarrow as pa
 from tqdm import tqdm
 
 from .. import __version__
-from ..data.certificates import certificate_tables
+from ..data.certificates import certificate_tables, join_proofs
 from ..data.database import Bake, VisibleRows, write_bake
 from ..data.errors import InputError
 from ..data.graph import CellGraph
@@ -197,7 +197,8 @@ def _prepare(scene: Scene | None, graph_folder: Path | None, settings: Settings,
         return _Prepared(scene, graph, opaque, facts | notes, False, method)
     if method == "auto":
         method = "occluders"
-    portal_graph = build_graph(scene, settings, clock)[0] if method != "occluders" else None
+    # With certificates nothing is hidden by portals alone: the model is what a proof is checked against.
+    portal_graph = build_graph(scene, settings, clock)[0] if method != "occluders" and not settings.certify else None
     opaque = opaque_rectangles(scene)
     if cells == "octree":
         roots = octree_roots(scene, settings.cell_size_m)
@@ -249,8 +250,6 @@ def _check(settings: Settings, budget_s: float | None, threads: int | None, devi
         raise InputError(f"seal: expected 0 (closing cracks is not built yet), found {settings.seal}")
     if settings.method not in METHODS:
         raise InputError(f"method: expected {', '.join(METHODS)}, found {settings.method!r}")
-    if settings.certify and settings.method != "occluders":
-        raise InputError(f"certify: expected the method occluders, found {settings.method!r}")
     if not 0 <= settings.depth <= DEEPEST:
         raise InputError(f"depth: expected a whole number from 0 to {DEEPEST}, found {settings.depth}")
     import warp as wp
@@ -368,14 +367,14 @@ def _visibility(
 
     Finished blocks are kept beside the target. Cells of an octree are refined on the way: `prepared` has them all then.
     """
-    from ..kernels.engine import Engine, ViewCellEngine, join_proofs
+    from ..kernels.engine import Engine, ViewCellEngine
     from ..kernels.launch import thread_count
 
     scene, graph = prepared.scene, prepared.graph
     options = {"seed": settings.seed, "threads": thread_count(threads), "device": device, "method": prepared.method}
+    options["certify"] = settings.certify
     if prepared.view_cells:
-        options |= {"portal_graph": prepared.portal_graph, "certify": settings.certify}
-        engine = ViewCellEngine(scene, graph, prepared.opaque, **options)
+        engine = ViewCellEngine(scene, graph, prepared.opaque, portal_graph=prepared.portal_graph, **options)
     else:
         engine = Engine(scene, graph, prepared.opaque, **options)
     clock.lap("prepare")
@@ -397,9 +396,12 @@ def _visibility(
     bar.close()
     clock.lap("flood")
     tables = {}
-    if (proofs := join_proofs(parts)) is not None:
-        columns = (proofs.cell, proofs.boxes, proofs.starts, proofs.leaves)
-        tables = certificate_tables(*columns, *engine.occluders, scene.grid_m)
+    if settings.certify:
+        proofs = join_proofs([part.proofs for part in parts if part.proofs is not None])
+        tables = certificate_tables(proofs, *engine.occluders, prepared.facts["grid_m"])
+        prepared.facts["counts"] = prepared.facts["counts"] | {"proofs": len(proofs.cell)}
+        prepared.facts["certificate_s"] = round(proofs.seconds, 3)
+        clock.lap("certificates")
     return *engine.join(parts), tables, spent
 
 

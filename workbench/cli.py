@@ -180,7 +180,7 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
         help="refine a cell if more of its set than this is unknown",
     )
     bake.add_argument(
-        "--certify", action="store_true", help="store a certificate of all that is hidden (method occluders only)"
+        "--certify", action="store_true", help="store a certificate of all that is hidden, and hide nothing else"
     )
     bake.add_argument("--up", choices=["y", "z"], help="axis that points up in a mesh file")
     bake.add_argument("--unit", help="unit of a mesh file, a name or metres; metre by default")
@@ -204,6 +204,9 @@ def _add_verify(commands: argparse._SubParsersAction) -> None:
         "bake", metavar="BAKE", nargs="?", help="bake folder; with --replay, that of the case if left out"
     )
     verify.add_argument("--rays", type=_whole(0), default=1_000_000, help="to cast at least; 1,000,000 by default")
+    verify.add_argument(
+        "--certificates", action="store_true", help="check the certificates of a bake with --certify, and nothing else"
+    )
     verify.add_argument("--replay", metavar="CASE", help="judge the sightline of a case file again, and nothing else")
     verify.add_argument("--no-progress", action="store_true", help="no progress bar")
     _seed(verify, "origins and directions")

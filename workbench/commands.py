@@ -137,6 +137,8 @@ def verify(options: argparse.Namespace) -> int:
     _start_warp()
     if options.bake is None and options.replay is None:
         raise InputError("verify: expected a bake folder or --replay CASE, found neither")
+    if options.certificates and (options.bake is None or options.replay is not None):
+        raise InputError("verify: expected a bake folder and no case beside --certificates")
     made = None if options.bake is None else load(options.bake)
     from .verify import replay
     from .verify import verify as check
@@ -145,6 +147,12 @@ def verify(options: argparse.Namespace) -> int:
         outcome = replay(options.replay, made)
         say(outcome.line())
         return 0 if outcome.ok else FAILED
+    if options.certificates:
+        from ..verify.line_certificate import check_certificates
+
+        found = check_certificates(made)
+        say("\n".join([found.line(), *(f"refuted: {line}" for line in found.examples)]))
+        return FAILED if found.failed else 0
     result = check(made, rays=options.rays, seed=options.seed, progress=_progress(options))
     say(result.table())
     return 0 if result.ok else FAILED

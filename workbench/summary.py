@@ -29,8 +29,20 @@ def summary(bake: "Bake") -> str:
     if counts.get("potential_triangles"):
         share = 100.0 * counts["back_facing_triangles"] / counts["potential_triangles"]
         lines += [f"{share:.1f} % of the triangles in these sets face away from all of their cell", ""]
+    if "proofs" in counts:
+        lines += [_certificates(bake), ""]
     lines.append("seconds: " + ", ".join(f"{name} {value:.1f}" for name, value in facts["seconds"].items()))
     return "\n".join(lines + _skipped(facts.get("skipped", [])))
+
+
+def _certificates(bake: "Bake") -> str:
+    """Number of proofs, their size on disk, and what it took to write them down."""
+    from ..data.certificates import TABLES
+
+    count, seconds = bake.manifest["counts"]["proofs"], bake.manifest["certificate_s"]
+    size = sum((bake.folder / f"{name}.parquet").stat().st_size for name in TABLES)
+    each = max(count, 1)
+    return f"{count:,} proofs, a proof {size / each:,.0f} bytes and {1e6 * seconds / each:,.0f} us to write down"
 
 
 def _skipped(skipped: list[dict[str, str]]) -> list[str]:

@@ -15,8 +15,8 @@ from ..verify.adjudicate import Judge, Judgement, sightline_end
 from ..verify.aims import ORIGINS_MOST, aim_points, cell_origins, frontier_points
 from ..verify.casefile import WrongHidden, read_case, write_case
 from ..verify.findings import VerifyResult, count_pairs
+from ..verify.line_certificate import check_certificates, has_certificates
 from ..verify.rays import Candidates, Caster
-from ..verify.shaft_certificate import check_certificates, has_certificates
 from ..verify.sightline import Sightlines
 from ..verify.walk import contact_links, portal_links
 from ..verify.witness import CHUNK, confirm_cells, confirm_objects, read_witnesses, visible_rows
