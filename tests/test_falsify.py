@@ -15,7 +15,7 @@ from viewcell.data.scene import Role
 from viewcell.verify.adjudicate import Judgement, sightline_end
 from viewcell.verify.aims import cell_origins
 from viewcell.verify.bench import falsify as bench
-from viewcell.verify.crossing import crossed_cells
+from viewcell.verify.crossing import Crossings
 from viewcell.verify.falsify import ATTEMPTS, SHARES, Falsifier, scaled_shares
 from viewcell.verify.free_space import FREE, MIXED, SOLID, FreeSpace
 from viewcell.verify.guide import Hints, edge_table, pass_edges
@@ -259,12 +259,11 @@ def test_crossed_cells_are_those_before_the_hit():
     directions = np.float32([[1, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0]])
     reach = np.float32([24, 14, np.inf, np.inf, np.inf])
     wanted = np.array([[False, True, True]])
-    found = crossed_cells(origins, directions, reach, np.zeros(5, int), boxes, wanted)
+    crossings, rows = Crossings(boxes), np.zeros(5, int)
+    found = crossings.crossed(origins, directions, reach, rows, wanted)
     # Room 2 is crossed for longest; room 1 alone where the ray ends before it; a ray beside, and one away, cross none.
     assert found.tolist() == [1, -1, 2, -1, -1]
-    assert crossed_cells(origins[:1], directions[:1], reach[2:3], np.zeros(1, int), boxes, wanted & False).tolist() == [
-        -1
-    ]
+    assert (crossings.crossed(origins, directions, reach, rows, wanted & False) == -1).all()
 
 
 def test_shares_are_scaled():

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data.errors import InputError
-from .crossing import crossed_cells
+from .crossing import Crossings
 from .free_space import FreeSpace, all_axes
 from .guide import SHORT, STRATEGIES, Aimed, Guide, Hints, Lesson, length, slab
 from .rays import Candidates, embree_scene
@@ -114,6 +114,7 @@ class Falsifier:
         self.free = FreeSpace(boxes, spots, lines or Sightlines(*opaque))
         triangles, owners = (np.concatenate(pair) for pair in zip(opaque, glass, strict=True))
         self.targets = Targets(triangles, owners, objects, cells)
+        self._crossings = Crossings(self.targets.cells)
         self._guide = Guide(
             self.free, self.targets, np.concatenate([claimed, claimed_cells], axis=1), opaque, hints, seed
         )
@@ -230,8 +231,7 @@ class Falsifier:
         objects, rays = self.targets.objects, np.flatnonzero(aimed.fresh)
         hidden = self._guide.hidden
         wanted = (hidden & (self._attempts.reshape(hidden.shape) < ATTEMPTS))[:, objects:]
-        columns = (aimed.origins[rays], directions[rays], reach[rays], aimed.rows[rays])
-        cells = crossed_cells(*columns, self.targets.cells, wanted)
+        cells = self._crossings.crossed(aimed.origins[rays], directions[rays], reach[rays], aimed.rows[rays], wanted)
         return rays[cells >= 0], cells[cells >= 0].astype(np.int64) + objects
 
     def _through_glass(

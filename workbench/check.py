@@ -286,9 +286,9 @@ class _Hunt:
         for kind in self.result.claimed:
             marked = marks[:, :objects] if kind == "object" else marks[:, objects:]
             self.result.seen[kind][sources] = marked
+        look = SecondLook(falsifier.free, falsifier.targets, self.opaque)
         for kind, matrix in self.result.claimed.items():
             rows, targets = np.nonzero(matrix[sources] & ~self.result.seen[kind][sources])
-            look = SecondLook(falsifier.free, falsifier.targets, self.opaque)
             shift = 0 if kind == "object" else objects
             found, cast = look.see(rows, targets + shift, AGAIN, self.seed)
             self.result.seen[kind][sources[rows[found]], targets[found]] = True
