@@ -93,6 +93,9 @@ def face_covers(maps: Maps, slot: int, size: int, levels: int, low: wp.vec3d, hi
 @wp.func
 def map_covers(maps: Maps, m: int, size: int, levels: int, low: wp.vec3d, high: wp.vec3d) -> bool:
     """Whether map m covers a box given relative to its viewpoint; never if that is inside, where no depth is least."""
+    # A point at the viewpoint is in no face's pyramid: nothing would be asked of it.
+    if wp.max(low[0], wp.max(low[1], low[2])) <= f64(0.0) and wp.min(high[0], wp.min(high[1], high[2])) >= f64(0.0):
+        return False
     for face in range(6):
         axis = int(face // 2)
         u = int((axis + 1) % 3)

@@ -208,6 +208,10 @@ def _add_verify(commands: argparse._SubParsersAction) -> None:
         "--certificates", action="store_true", help="check the certificates of a bake with --certify, and nothing else"
     )
     verify.add_argument("--replay", metavar="CASE", help="judge the sightline of a case file again, and nothing else")
+    verify.add_argument(
+        "--hard-cases", action="store_true", help="put the hard cases that come with viewcell to every kernel instead"
+    )
+    verify.add_argument("--device", help="of the hard cases, such as cuda:0; the CPU and the first GPU by default")
     verify.add_argument("--no-progress", action="store_true", help="no progress bar")
     _seed(verify, "origins and directions")
 

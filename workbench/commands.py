@@ -135,6 +135,10 @@ def verify(options: argparse.Namespace) -> int:
     from ..data.database import load
 
     _start_warp()
+    if options.hard_cases:
+        return _hard_cases(options)
+    if options.device is not None:
+        raise InputError(f"device: expected it beside --hard-cases only, found {options.device!r}")
     if options.bake is None and options.replay is None:
         raise InputError("verify: expected a bake folder or --replay CASE, found neither")
     if options.certificates and (options.bake is None or options.replay is not None):
@@ -156,6 +160,17 @@ def verify(options: argparse.Namespace) -> int:
     result = check(made, rays=options.rays, seed=options.seed, progress=_progress(options))
     say(result.table())
     return 0 if result.ok else FAILED
+
+
+def _hard_cases(options: argparse.Namespace) -> int:
+    """Put the hard cases to every kernel; the exit code says whether one was wrong."""
+    from .hard_cases import hard_cases_table, run_hard_cases
+
+    if options.bake is not None or options.replay is not None or options.certificates:
+        raise InputError("verify: expected no bake, case or certificates beside --hard-cases")
+    rows = run_hard_cases(None if options.device is None else [options.device])
+    say(hard_cases_table(rows))
+    return FAILED if any(row.wrong for row in rows) else 0
 
 
 def check(options: argparse.Namespace) -> int:
