@@ -254,15 +254,20 @@ def test_uniform_rays_see_hidden_cells_too(house):
 
 
 def test_crossed_cells_are_those_before_the_hit():
-    boxes = np.array([[[0, 0, 0], [10, 10, 10]], [[20, 0, 0], [25, 10, 10]], [[30, 0, 0], [60, 10, 10]]], np.float32)
-    origins = np.tile(np.float32([5, 5, 5]), (5, 1))
-    directions = np.float32([[1, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0]])
-    reach = np.float32([24, 14, np.inf, np.inf, np.inf])
-    wanted = np.array([[False, True, True]])
-    crossings, rows = Crossings(boxes), np.zeros(5, int)
+    boxes = [
+        [[0, 0, 0], [10, 10, 10]],
+        [[20, 0, 0], [25, 10, 10]],
+        [[30, 0, 0], [60, 10, 10]],
+        [[0, 0, 20], [9, 9, 30]],
+    ]
+    origins = np.tile(np.float32([5, 5, 5]), (6, 1))
+    directions = np.float32([[1, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, 0, -1]])
+    reach = np.float32([24, 14, np.inf, np.inf, np.inf, np.inf])
+    wanted = np.array([[False, True, True, True]])
+    crossings, rows = Crossings(np.array(boxes, np.float32)), np.zeros(6, int)
     found = crossings.crossed(origins, directions, reach, rows, wanted)
     # Room 2 is crossed for longest; room 1 alone where the ray ends before it; a ray beside, and one away, cross none.
-    assert found.tolist() == [1, -1, 2, -1, -1]
+    assert found.tolist() == [1, -1, 2, -1, -1, -1]
     assert (crossings.crossed(origins, directions, reach, rows, wanted & False) == -1).all()
 
 
