@@ -80,7 +80,9 @@ def test_joint_occlusion_is_found_and_shrinks():
 def test_walls_come_in_pieces_that_meet_or_leave_a_slit(shared):
     def pieces(pair):
         return any(
-            a[0][0] == b[0][0] and len(set(a) & set(b)) == shared and abs(a[1][1] - b[0][1]) == (shared == 0)
+            (a[0][0], a[0][2], a[3][2]) == (b[0][0], b[0][2], b[3][2])
+            and len(set(a) & set(b)) == shared
+            and b[0][1] - a[1][1] == (shared == 0)
             for a in pair.occluders
             for b in pair.occluders
             if a != b

@@ -34,7 +34,7 @@ def find_crossed(
             one = wp.cw_mul(boxes[cell, 0] - o, pace)
             two = wp.cw_mul(boxes[cell, 1] - o, pace)
             near, far = wp.min(one, two), wp.max(one, two)
-            enter = wp.max(wp.max(near[0], near[1]), wp.max(near[2], 0.0))
+            enter = wp.max(wp.max(near[0], near[1]), near[2])
             leave = wp.min(wp.min(far[0], far[1]), wp.min(far[2], end))
             if leave - enter > longest:
                 longest = leave - enter
