@@ -22,6 +22,7 @@ from viewcell.verify.region_exact import region_visible
 from viewcell.verify.sightline import Sight, Sightlines
 from viewcell.verify.walk import portal_links, portal_path
 from viewcell.workbench import hard_cases, hard_kernels
+from viewcell.workbench.bake import METHODS
 from viewcell.workbench.cli import main
 from viewcell.workbench.hard_cases import Row, hard_cases_table, run_hard_cases
 
@@ -29,7 +30,7 @@ ROOT = Path(__file__).resolve().parents[1]
 BUILDINGS = runpy.run_path(str(Path(__file__).with_name("random_buildings.py")))
 CASES = load_hard_cases()
 # Kernels that take seconds.
-LONG = ("launch_shrink", "launch_occludees", "solve_points", "bake portals", "bake occluders")
+LONG = ("launch_shrink", "launch_occludees", "vlod_hidden", "solve_points", *(f"bake {m}" for m in METHODS[1:]))
 
 
 def polygons(shapes):
@@ -244,9 +245,11 @@ BROKEN = {
     "launch_coverage": ("launch_coverage", FullMaps),
     "launch_occludees": ("launch_occludees", np.ones_like),
     "launch_backface": ("launch_backface", lambda found: (found[0] + 1, found[1])),
+    "vlod_hidden": ("vlod_hidden", lambda found: (np.ones_like(found[0]), found[1])),
     "solve_points": ("launch_occludees", np.ones_like),
     "bake portals": ("bake", HidingBake),
     "bake occluders": ("bake", HidingBake),
+    "bake both": ("bake", HidingBake),
 }
 
 

@@ -28,7 +28,7 @@ from ..kernels.shaft import device_shields, launch_shaft
 from ..kernels.sightline import aim_targets, device_triangles, launch_aim, launch_confirm
 from ..kernels.stab_batch import launch_stab
 from ..kernels.target import BlockerTree, blocker_tree, launch_target_search
-from ..kernels.vlod import join_outlines
+from ..kernels.vlod import VlodSettings, join_outlines, vlod_hidden
 from ..kernels.walk import launch_walk
 from ..verify.exact import cross, dot, minus
 from ..verify.hard_cases import (
@@ -441,6 +441,14 @@ def _solve_points(cases: HardCases, device: str) -> Outcomes:
             yield f"{name}, {objective}", outcome
 
 
+def _vlod(cases: HardCases, device: str) -> Outcomes:
+    settings = VlodSettings(clusters=6, objective="centre", resolution=RESOLUTION)
+    for asked in _questions(cases):
+        cells, boxes = np.array([asked.cell], np.int32), np.array([asked.box], np.int32)
+        hidden, _ = vlod_hidden(cells, _outlines(asked.shapes), boxes, np.zeros(1, int), settings, device=device)
+        yield asked.name, _one_sided(bool(hidden[0, 0]), asked.hidden)
+
+
 def _backface(cases: HardCases, device: str) -> Outcomes:
     for case in cases.backface:
         boxes, rows = np.array([case.cell], np.int32), np.zeros((1, 2), int)
@@ -504,7 +512,9 @@ KERNELS: dict[str, Callable[[HardCases, str], Outcomes]] = {
     "launch_coverage": _coverage,
     "launch_occludees": _occludees,
     "launch_backface": _backface,
+    "vlod_hidden": _vlod,
     "solve_points": _solve_points,
     "bake portals": _bake("portals"),
     "bake occluders": _bake("occluders"),
+    "bake both": _bake("both"),
 }
