@@ -285,12 +285,16 @@ def test_command_exits_1_on_a_wrong_kernel(only_stab, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    "arguments",
-    [["--hard-cases", "--device", "gpu9"], ["a.bake", "--hard-cases"], ["a.bake", "--device", "cpu"]],
+    ("arguments", "message"),
+    [
+        (["--hard-cases", "--device", "gpu9"], "expected one that Warp knows, found 'gpu9'"),
+        (["a.bake", "--hard-cases"], "expected no bake, case or certificates beside --hard-cases"),
+        (["a.bake", "--device", "cpu"], "expected it beside --hard-cases only, found 'cpu'"),
+    ],
 )
-def test_command_refuses(arguments, only_stab, capsys):
+def test_command_refuses(arguments, message, only_stab, capsys):
     assert main(["verify", *arguments]) == 2
-    assert "expected" in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 def test_table():
