@@ -108,7 +108,7 @@ def _from_matrix(
     fits = [name for name in whole + packed if targets in (None, name) and sizes[name]]
     if len(fits) != 1:
         wanted = " or ".join(f"{cells} x {size} for {name}" for name, size in sizes.items() if size)
-        found = " x ".join(map(str, matrix.shape))
+        found = " x ".join(map(str, matrix.shape)) or "a single number"
         doubt = ", which may be either: say which targets it has" if fits else ""
         raise InputError(f"{where}: expected a matrix of {wanted} (or an eighth as wide), found {found}{doubt}")
     kind = fits[0]
@@ -127,6 +127,8 @@ def _from_table(table: pa.Table, view: ViewCells, object_names: Sequence[str], w
     if "cell_id" not in table.column_names or len(found) != 1:
         columns = ", ".join(table.column_names) or "no column"
         raise InputError(f"{where}: expected the columns cell_id and object_id or reached_cell_id, found {columns}")
+    if not table.num_rows:
+        raise InputError(f"{where}: expected at least one claim, found an empty table")
     kind = found[0]
     if kind == "object" and not object_names:
         raise InputError(f"{where}: expected claims of cells for a model without objects, found claims of objects")
@@ -179,10 +181,12 @@ def _places(column: pa.ChunkedArray, ids: np.ndarray, names: Sequence[str], what
         raise InputError(f"{where}: expected {what} ids or names, found {column.type}")
     known = {value: place for place, value in enumerate(ids.tolist())}
     values = column.to_pylist()
-    if is_text and not known.keys() >= set(values):
+    if is_text:
         uses = Counter(names)
-        known = {name: place for place, name in enumerate(names) if uses[name] == 1}
-        shared = next((value for value in values if uses[value] > 1), None)
+        named = {name: place for place, name in enumerate(names) if uses[name] == 1}
+        # Ids that are text themselves come before names, numbers that are written as text come after them.
+        known = named | known if ids.dtype == object else {str(value): place for value, place in known.items()} | named
+        shared = next((value for value in values if value not in known and uses[value] > 1), None)
         if shared is not None:
             raise InputError(
                 f"{where}: expected names that stand for one {what}, found {shared!r} for {uses[shared]}: use ids"

@@ -46,6 +46,11 @@ def test_text_ids_come_before_names():
     assert np.argwhere(claims.objects).tolist() == [[2, 3]]
 
 
+def test_numbers_written_as_text_are_ids_unless_they_are_names(view):
+    claims = read_claims([table([("10", "3"), ("kitchen", "12"), ("30", "0")])], view, NAMES)
+    assert np.argwhere(claims.objects).tolist() == [[0, 3], [1, 4], [2, 0]]
+
+
 def test_cells_see_themselves(view):
     claims = read_claims([table([(10, 20)], "reached_cell_id")], view, NAMES)
     assert claims.cells.tolist() == [[True, True, False], [False, True, False], [False, False, True]]
@@ -105,6 +110,8 @@ BAD = {
     "no bits": (np.full((3, 5), 2), "expected bits, found 2"),
     "real matrix": (np.zeros((3, 5)), "expected a matrix of bits, found float64"),
     "empty matrix": (np.zeros((3, 5), bool), "expected at least one claim, found none"),
+    "text beside numbers": (table([("10", "0"), ("10", "sofa")]), "expected objects of the model, found 'sofa'"),
+    "a single bit": (np.array(True), "found a single number"),
     "no table": (7, "expected a table or a matrix"),
 }
 
