@@ -21,6 +21,7 @@ from viewcell.verify.bench import models as models_bench
 from viewcell.verify.casefile import WrongHidden, load_cases, read_case, write_case
 from viewcell.verify.sightline import Sightlines
 from viewcell.verify.walk import contact_links, portal_links
+from viewcell.workbench import verify as workbench_verify
 from viewcell.workbench.bake import bake
 from viewcell.workbench.verify import make_judge, replay, verify
 
@@ -113,6 +114,24 @@ def test_every_planted_hidden_object_is_found(house, target):
     assert (case.cell, case.kind, case.target) == (2, "object", target)
     again = replay(result.case, house)
     assert not again.ok and again.line().startswith("wrong-hidden: cell 2, object")
+
+
+@pytest.mark.parametrize("kind", ["cell", "object"])
+def test_guided_rays_find_what_is_planted(house, kind, monkeypatch):
+    """Alone: the even rays are left out."""
+    monkeypatch.setattr(workbench_verify, "_cast_all", lambda *_: None)
+    (house.potential_cells if kind == "cell" else house.potential_objects)[2, 4] = False
+    result = verify(house, rays=RAYS)
+    assert result.wrong_hidden == 1 and not result.ok and "confidence" not in result.table()
+    case = read_case(result.case)
+    assert (case.cell, case.kind, case.target) == (2, kind, 4) and not replay(result.case, house).ok
+
+
+def test_verify_says_how_sure_it_is(house, bare):
+    result = verify(house, rays=RAYS)
+    assert result.guided_rays == RAYS // 4 and len(result.random_rays) == house.graph.inhabitable.sum()
+    assert "with 95 % confidence no view cell of 4 hides more than" in result.table()
+    assert "confidence" not in verify(bare, rays=1000).table()
 
 
 def test_a_missing_portal_is_found(house):

@@ -5,7 +5,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from .certified import Certified
+from .confidence import Confidence
 from .rays import Caster
 from .witness import Confirmed, visible_rows
 
@@ -55,6 +58,8 @@ class VerifyResult:
         rays_per_second: while casting, walking and judging; compiling and building excluded.
         embree_rates: rays a second of this check and of Embree alone, on the same rays and threads, one pair for each
             part of the run; none for a bare graph, which has no triangles.
+        guided_rays: beyond these, that look where an omission is likeliest; none for a bare graph.
+        random_rays: of the guided ones that are independent and random, for each inhabitable cell with a free point.
         wrong_hidden: hidden pairs that an exactly adjudicated sightline shows; the run stops at the first.
         case: the case file written for it.
         grazes: candidate rays that only touch an edge, a vertex or a boundary.
@@ -72,6 +77,8 @@ class VerifyResult:
     cell_rays: int = 0
     rays_per_second: float = 0.0
     embree_rates: list[tuple[float, float]] = field(default_factory=list)
+    guided_rays: int = 0
+    random_rays: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     wrong_hidden: int = 0
     case: Path | None = None
     grazes: int = 0
@@ -107,9 +114,11 @@ class VerifyResult:
             f"{found.confirmed:,} confirmed, {found.refuted:,} refuted"
             for found in (self.cell_witnesses, self.object_witnesses)
         ]
+        confident = self.guided_rays and not self.wrong_hidden
         rows = [
             ("wrong-hidden", f"{self.wrong_hidden}" + (f" (case file {self.case})" if self.case else "")),
             ("rays, for objects / for cells", f"{self.rays:,} / {self.cell_rays:,}"),
+            *([("guided rays", f"{self.guided_rays:,}")] if self.guided_rays else []),
             ("rays a second", f"{self.rays_per_second:,.0f}{ratio}"),
             ("grazes", f"{self.grazes:,}"),
             ("leaks narrower than the seal", f"{self.leaks:,}"),
@@ -118,6 +127,7 @@ class VerifyResult:
             ("cell witnesses", witnesses[0]),
             ("object witnesses", witnesses[1]),
             *([("certificates", self.certificates.line())] if self.certificates else []),
+            *([("confidence", Confidence(self.random_rays).line())] if confident else []),
             ("seconds", ", ".join(f"{name} {value:.1f}" for name, value in self.seconds.items())),
         ]
         lines = ["| check | result |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows), ""]

@@ -14,7 +14,9 @@ from ..data.scene import Role
 from ..verify.adjudicate import Judge, Judgement, sightline_end
 from ..verify.aims import ORIGINS_MOST, aim_points, cell_origins, frontier_points
 from ..verify.casefile import WrongHidden, read_case, write_case
+from ..verify.falsify import Falsifier
 from ..verify.findings import VerifyResult, count_pairs
+from ..verify.hints import certificate_hints
 from ..verify.line_certificate import check_certificates, has_certificates
 from ..verify.rays import Candidates, Caster
 from ..verify.sightline import Sightlines
@@ -30,6 +32,8 @@ AIMS = (1 << 14, 1 << 20)
 # The same in hidden cells beside the potentially visible ones, for each source.
 FRONTIER = (64, 4096)
 THREADS = 2
+# One guided ray for so many even ones.
+GUIDED = 4
 # Embree's own rate is taken so many times in a run.
 RATE_BLOCKS = 5
 KINDS = ("cell", "object")
@@ -59,6 +63,8 @@ def verify(bake: "Bake", *, rays: int = 1_000_000, seed: int = 0, progress: bool
     result.seconds["prepare"] = time.perf_counter() - start
     if rays and len(sources):
         _cast_all(bake, caster, judge, rays, progress, result)
+        if bake.scene is not None and not result.wrong_hidden:
+            _hunt(bake, caster, judge, rays // GUIDED, progress, result)
     start = time.perf_counter()
     _confirm_all(bake, judge, progress, result)
     result.seconds["witnesses"] = time.perf_counter() - start
@@ -167,11 +173,11 @@ def _make_caster(
 
 def _cast_all(bake: "Bake", caster: Caster, judge: Judge, rays: int, progress: bool, result: VerifyResult) -> None:
     """Cast in batches on two threads; judge candidates in order; stop at the first wrong-hidden."""
-    rows = len(caster.sources)
+    sources, rows = caster.sources, len(caster.sources)
     total = -(-rays // rows)
     # The first batch is one ray a cell: it compiles the kernels, outside the clock and on one thread.
     start = time.perf_counter()
-    if _judge_batch(bake, caster, judge, caster.cast(0, 1), result):
+    if _judge_batch(bake, sources, judge, caster.cast(0, 1), result):
         result.rays, result.cell_rays = rows, caster.cell_rays(1)
         return
     result.seconds["compile"] = time.perf_counter() - start
@@ -183,7 +189,7 @@ def _cast_all(bake: "Bake", caster: Caster, judge: Judge, rays: int, progress: b
             for (_, run), found in zip(block, pool.map(lambda batch: caster.cast(*batch), block), strict=True):
                 done += run
                 bar.update(rows * run)
-                if _judge_batch(bake, caster, judge, found, result):
+                if _judge_batch(bake, sources, judge, found, result):
                     pool.shutdown(cancel_futures=True)
                     break
             seconds = time.perf_counter() - start
@@ -208,10 +214,37 @@ def _blocks(rows: int, total: int) -> list[list[tuple[int, int]]]:
     return [batches[place : place + size] for place in range(0, len(batches), size)]
 
 
-def _judge_batch(bake: "Bake", caster: Caster, judge: Judge, found: Candidates, result: VerifyResult) -> bool:
+def _hunt(bake: "Bake", caster: Caster, judge: Judge, rays: int, progress: bool, result: VerifyResult) -> None:
+    """Rays that look where an omission is likeliest, and random ones that bound what is missed."""
+    start, sources = time.perf_counter(), caster.sources
+    cells = {}
+    if bake.claims_cells:
+        cells = {"claimed_cells": bake.potential_cells[sources], "cells": bake.graph.cells}
+    falsifier = Falsifier(
+        boxes=bake.graph.cells[sources],
+        spots=caster.spots,
+        claimed=bake.potential_objects[sources],
+        opaque=caster.opaque,
+        glass=caster.glass,
+        lines=judge.lines,
+        hints=certificate_hints(bake, sources) if has_certificates(bake) else None,
+        seed=caster.seed,
+        **cells,
+    )
+    with tqdm(total=rays, unit="ray", unit_scale=True, desc="guided", disable=not progress) as bar:
+        for found, state in falsifier.batches(rays):
+            bar.update(state.rays - bar.n)
+            result.guided_rays = state.rays
+            if _judge_batch(bake, sources, judge, found, result):
+                break
+    result.random_rays = falsifier.uniform_rays
+    result.seconds["guided rays"] = time.perf_counter() - start
+
+
+def _judge_batch(bake: "Bake", sources: np.ndarray, judge: Judge, found: Candidates, result: VerifyResult) -> bool:
     """Count a batch's candidates; write the case file of the first wrong-hidden and say True."""
     for number in range(len(found.rows)):
-        cell, kind = int(caster.sources[found.rows[number]]), KINDS[found.kinds[number]]
+        cell, kind = int(sources[found.rows[number]]), KINDS[found.kinds[number]]
         target, origin = int(found.targets[number]), found.origins[number]
         end = sightline_end(found, number, bake.graph.cells)
         outcome = judge.judge(kind, cell, target, origin, end)
