@@ -142,20 +142,25 @@ def test_a_tree_with_a_changed_word_is_refused_or_true(cases, data):
     )
 
 
-def test_a_side_may_not_be_left_out(cases):
-    """The order of sides of a node must name all four: naming one twice leaves a way open."""
-    for case in cases[:40]:
-        for place, word in enumerate(case[4]):
-            if word >= 0:
-                twice = word - word % 256 + (word & 0b111111) + ((word & 0b11) << 6)
-                assert not check(case, [*case[4][:place], twice, *case[4][place + 1 :]])
+def test_a_side_may_not_be_left_out():
+    """Beyond the side that comes first and short of it is a contradiction, which would close a way that is open."""
+    source, target = [[0, 0, 0], [2, 2, 2]], [[8, 4, 4], [10, 6, 6]]
+    whole, low = ({0: Blocker(0, [[5, -40, -40], [5, 40, top]])} for top in (40, 3))
+    sides, leaves = [0, 1, 2, 3], [-17, -3081, -19]
+    first = sum(side << 2 * n for n, side in enumerate(sides))
+    assert hides(source, target, False, [first, *leaves, -3083], whole)
+    assert not hides(source, target, False, [first, *leaves, -3083], low)
+    # Row 3 from axis 0 to 1 is beyond the side, row 2 from axis 1 to 0 short of it.
+    both = -1 - 8 * (3 + 128 * 2)
+    assert not hides(source, target, False, [first & 0b111111, *leaves, both], low)
 
 
-def test_boxes_that_overlap_have_no_tree():
-    box = [[0, 0, 0], [4, 4, 4]]
-    assert not hides(box, [[3, 3, 3], [5, 5, 5]], True, [], {})
-    # No octant leads from one to the other only if they are the same point of an axis and flat.
-    assert not hides(box, [[4, 0, 0], [8, 4, 4]], True, [], {})
+def test_boxes_that_overlap_have_no_tree(cases):
+    for case in cases:
+        for octants in range(1, 9):
+            assert not check(case, case[4] * octants, target=case[0])
+        wide = np.stack([np.minimum(case[0][0], case[1][0]) - 1, np.maximum(case[0][1], case[1][1]) + 1])
+        assert not check(case, source=wide) and not check(case, target=wide)
 
 
 def test_a_blocker_on_the_near_face_hides_a_cell_but_not_an_object():

@@ -95,10 +95,10 @@ def hides(source: Box, target: Box, closed: bool, words: list[int], blockers: di
         closed: whether a blocker on the box's near face leaves that face in sight.
         words: of the tree.
         blockers: by id, real ones.
+
+    A tree says of every line through both that it meets a blocker after it left the cell and before it enters the box.
+    So does every sightline along it, wherever it begins and ends; and if the boxes overlap, no tree can say so.
     """
-    # Boxes apart on an axis: a line can only run from one to the other, and every crossing has its place between.
-    if not any(source[1][i] <= target[0][i] or target[1][i] <= source[0][i] for i in range(3)):
-        return False
     rest = iter(words)
     try:
         for octant in range(8):
