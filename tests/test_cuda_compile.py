@@ -14,6 +14,7 @@ MODULES = (
     "coverage",
     "occludee",
     "backface",
+    "select",
     "shadow",
 )
 HOPPER = 90

@@ -18,6 +18,7 @@ from viewcell.verify.backface_exact import back_facing, outward_triangles
 from viewcell.verify.coverage_exact import cover_polygon, covers_box
 from viewcell.verify.exact import cross, dot, minus
 from viewcell.verify.hard_cases import FOLDER, LOADERS, faces, fan, load_hard_cases
+from viewcell.verify.knapsack_exact import best_by_table
 from viewcell.verify.region_exact import region_visible
 from viewcell.verify.sightline import Sight, Sightlines
 from viewcell.verify.walk import portal_links, portal_path
@@ -118,6 +119,13 @@ def model_answer(case):
     return {pair for pair, verdict in verdicts.items() if verdict is Verdict.VISIBLE}
 
 
+def knapsack_answer(case):
+    """The largest benefit within the budget, if anything fits."""
+    benefits, costs = ([[level[i] for level in levels] for levels in case.objects] for i in range(2))
+    found = best_by_table(benefits, costs, case.budget)
+    return found and found.value
+
+
 def said(case):
     return case.expected
 
@@ -132,6 +140,7 @@ ANSWERS = {
     "graph": (CASES.graph, graph_answer, lambda case: case.seen, 1),
     "walks": (CASES.graph, walks_answer, lambda case: [walk.reached for walk in case.walks], 1),
     "model": (CASES.model, model_answer, lambda case: case.seen, 18),
+    "knapsack": (CASES.knapsack, knapsack_answer, said, 1),
 }
 
 
@@ -245,6 +254,7 @@ BROKEN = {
     "launch_coverage": ("launch_coverage", FullMaps),
     "launch_occludees": ("launch_occludees", np.ones_like),
     "launch_backface": ("launch_backface", lambda found: (found[0] + 1, found[1])),
+    "launch_select": ("launch_select", lambda found: replace(found, bound=found.bound / 2)),
     "vlod_hidden": ("vlod_hidden", lambda found: (np.ones_like(found[0]), found[1])),
     "solve_points": ("launch_occludees", np.ones_like),
     "bake portals": ("bake", HidingBake),
@@ -326,6 +336,7 @@ GOOD = {
     "backface": "a; 10; 200 10 10, 220 90 90; 0 0 0, 100 100 100; by hand",
     "graph": "a; 0 0 0, 4 4 4 | 4 0 0, 8 4 4; 0 1: 4 1 1, 4 2 2; 0 1; 0 -: 1 1 1, 9 1 1 | 0 1: 1 1 1, 5 1 1; by hand",
     "model": "a; occluder: 0 0 0, 1 1 1 / detail: 0 0 0.5, 1 0 0, 0 1 0; 5 0 0, 6 1 1; 0 0, 0 1; by hand",
+    "knapsack": "a; 7; 5; 0 0, 7 5 | 2 0; by hand",
 }
 # What is written instead of what.
 BAD = {
@@ -363,6 +374,7 @@ BAD = {
         ("0 -", "2 -"),
         ("9 1 1 |", "9 1 1, 1 1 1 |"),
     ],
+    "knapsack": [("7;", "x;"), ("; 5;", "; -5;"), ("7 5", "7"), ("7 5", "7 -5"), ("7 5", "7 5.5"), (" | 2 0", " |")],
     "model": [("occluder", "wall"), ("0 0, 0 1;", "0 0, 1 0;"), ("0 0, 0 1;", "0 0, 0 2;"), ("0 0 0.5", "0 0 x")],
 }
 

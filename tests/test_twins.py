@@ -24,6 +24,7 @@ TWINS = {
     "launch_shrink": ("shadow", "shadow_exact.shrunk", "test_shadow.py"),
     "launch_grow_hole": ("shadow", "shadow_exact.grown_hole", "test_shadow.py"),
     "launch_occludees": ("occludee", "coverage_exact.covers_box", "test_coverage.py"),
+    "launch_select": ("select", "knapsack_exact.best_by_table", "test_select.py"),
 }
 
 

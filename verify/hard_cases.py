@@ -162,6 +162,25 @@ class ModelCase:
 
 
 @dataclass(frozen=True)
+class KnapsackCase:
+    """How much benefit fits into a budget of cost, with one level for each object?
+
+    Attributes:
+        name: unique.
+        expected: the largest sum of benefits within the budget, or None if no selection fits.
+        budget: integer >= 0.
+        objects: (benefit, cost) of each level, integers.
+        origin: where the case came from.
+    """
+
+    name: str
+    expected: int | None
+    budget: int
+    objects: list[list[tuple[int, int]]]
+    origin: str
+
+
+@dataclass(frozen=True)
 class HardCases:
     """All cases of a folder, by kind."""
 
@@ -173,6 +192,7 @@ class HardCases:
     backface: list[BackfaceCase]
     graph: list[GraphCase]
     model: list[ModelCase]
+    knapsack: list[KnapsackCase]
 
     def count(self) -> int:
         """Number of cases."""
@@ -355,6 +375,18 @@ def _model(name: str, objects: str, cells: str, seen: str, origin: str) -> Model
     return ModelCase(name, parts, boxes, _pairs(seen, len(boxes), len(parts)), origin)
 
 
+def _knapsack(name: str, expected: str, budget: str, objects: str, origin: str) -> KnapsackCase:
+    levels = []
+    for part in objects.split("|"):
+        pairs = [tuple(int(c) for c in level.split()) for level in part.split(",")]
+        if any(len(pair) != 2 or pair[1] < 0 for pair in pairs):
+            raise ValueError
+        levels.append(pairs)
+    if int(budget) < 0:
+        raise ValueError
+    return KnapsackCase(name, None if expected == "-" else int(expected), int(budget), levels, origin)
+
+
 def _loader(form: str, build: Callable[..., Case]) -> Callable[[Path], list[Case]]:
     return lambda path: _lines(path, form, build)
 
@@ -368,4 +400,5 @@ LOADERS: dict[str, Callable[[Path], list]] = {
     "backface": _loader("name; expected; cell; surface; origin", _backface),
     "graph": _loader("name; cells; portals; seen; walks; origin", _graph),
     "model": _loader("name; objects; cells; seen; origin", _model),
+    "knapsack": _loader("name; expected; budget; objects; origin", _knapsack),
 }

@@ -23,6 +23,7 @@ from ..kernels.engine import Engine, find_occluders
 from ..kernels.flood import launch_flood
 from ..kernels.line_tree import launch_line_trees
 from ..kernels.occludee import launch_occludees
+from ..kernels.select import launch_select
 from ..kernels.shadow import Umbras, launch_grow_hole, launch_shrink, launch_umbra
 from ..kernels.shaft import device_shields, launch_shaft
 from ..kernels.sightline import aim_targets, device_triangles, launch_aim, launch_confirm
@@ -497,6 +498,25 @@ def _baked(case: ModelCase, made: "Bake") -> Outcome:
     return _worst(outcomes)
 
 
+def _select(cases: HardCases, device: str) -> Outcomes:
+    """All whole numbers: values are exact. Less than the optimum is withheld, less than half of the gain wrong."""
+    for case in cases.knapsack:
+        levels = np.array([level for levels in case.objects for level in levels])
+        starts = np.cumsum([0, *map(len, case.objects)])
+        found = launch_select(levels[None, :, 0].astype(float), levels[:, 1], starts, case.budget, device=device)
+        if case.expected is None or not found.feasible[0]:
+            yield case.name, Outcome.RIGHT if (case.expected is None) != found.feasible[0] else Outcome.WRONG
+            continue
+        value, cost = levels[starts[:-1] + found.choice[0]].sum(axis=0).tolist()
+        told = value == found.value[0] and cost == found.cost[0]
+        base = sum(max(levels, key=lambda level: (-level[1], level[0]))[0] for levels in case.objects)
+        half = case.expected - base <= 2 * (value - base)
+        if told and half and cost <= case.budget and value <= case.expected <= found.bound[0]:
+            yield case.name, Outcome.RIGHT if value == case.expected else Outcome.WITHHELD
+        else:
+            yield case.name, Outcome.WRONG
+
+
 KERNELS: dict[str, Callable[[HardCases, str], Outcomes]] = {
     "launch_stab": _stab,
     "launch_flood": _flood,
@@ -512,6 +532,7 @@ KERNELS: dict[str, Callable[[HardCases, str], Outcomes]] = {
     "launch_coverage": _coverage,
     "launch_occludees": _occludees,
     "launch_backface": _backface,
+    "launch_select": _select,
     "vlod_hidden": _vlod,
     "solve_points": _solve_points,
     "bake portals": _bake("portals"),
