@@ -122,16 +122,15 @@ def best_level(knapsacks: Knapsacks, frame: int, g: int, price: wp.float64) -> i
     """Level that maximises benefit - price * cost of those that fit alone; of equals the cheapest, then the first."""
     budget = knapsacks.budgets[frame]
     best = int(-1)
-    most = f64(0.0)
+    most = f64(-wp.inf)
     least = f64(0.0)
     for level in range(knapsacks.starts[g], knapsacks.starts[g + 1]):
         cost = knapsacks.costs[level]
-        if cost <= budget:
-            worth = knapsacks.benefits[frame, level] - price * cost
-            if best < 0 or worth > most or (worth == most and cost < least):
-                best = level
-                most = worth
-                least = cost
+        worth = knapsacks.benefits[frame, level] - price * cost
+        better = cost <= budget and (worth > most or (worth == most and cost < least))
+        best = wp.where(better, level, best)
+        most = wp.where(better, worth, most)
+        least = wp.where(better, cost, least)
     return best
 
 
