@@ -297,19 +297,21 @@ def row_cost(knapsacks: Knapsacks, scratch: wp.array(dtype=int), lane: wp.vec3i,
 
 
 @wp.func
+def plus(total: wp.vec2d, term: wp.float64) -> wp.vec2d:
+    """Compensated addition (Neumaier 1974): the sum, and what its roundings have lost."""
+    after = total[0] + term
+    if wp.abs(total[0]) >= wp.abs(term):
+        return wp.vec2d(after, total[1] + ((total[0] - after) + term))
+    return wp.vec2d(after, total[1] + ((term - after) + total[0]))
+
+
+@wp.func
 def row_value(knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), lane: wp.vec3i, row: int) -> wp.float64:
-    """Benefit of a row, a compensated sum (Neumaier 1974)."""
-    total = f64(0.0)
-    lost = f64(0.0)
+    """Benefit of a row."""
+    total = wp.vec2d(f64(0.0), f64(0.0))
     for g in range(lane[0]):
-        term = knapsacks.benefits[frame, scratch[spot(lane, row, g)]]
-        after = total + term
-        if wp.abs(total) >= wp.abs(term):
-            lost += (total - after) + term
-        else:
-            lost += (term - after) + total
-        total = after
-    return total + lost
+        total = plus(total, knapsacks.benefits[frame, scratch[spot(lane, row, g)]])
+    return total[0] + total[1]
 
 
 @wp.func
@@ -391,8 +393,7 @@ def dual_value(knapsacks: Knapsacks, frame: int, lane: wp.vec3i, price: wp.float
     sum errs by 2 u sum m, the product p B by u p B, the last addition by u (sum m + p B), the value of a selection by
     2 u sum m: less than 2**-48 (sum m + p B) together.
     """
-    total = f64(0.0)
-    lost = f64(0.0)
+    total = wp.vec2d(f64(0.0), f64(0.0))
     size = f64(0.0)
     budget = knapsacks.budgets[frame]
     for g in range(lane[0]):
@@ -405,16 +406,11 @@ def dual_value(knapsacks: Knapsacks, frame: int, lane: wp.vec3i, price: wp.float
                 term = wp.max(term, b - price * cost)
                 largest = wp.max(largest, wp.abs(b))
         size += largest
-        after = total + term
-        if wp.abs(total) >= wp.abs(term):
-            lost += (total - after) + term
-        else:
-            lost += (term - after) + total
-        total = after
+        total = plus(total, term)
     margin = DUAL_MARGIN * (size + price * budget)
     if price > f64(0.0):
         margin += f64(lane[0]) * TINY
-    return total + lost + price * budget + margin
+    return total[0] + total[1] + price * budget + margin
 
 
 @wp.func
@@ -547,18 +543,17 @@ def launch_select(
     spare = np.clip(budget - least.sum(), -1, COST_LIMIT).astype(np.float64)
     on_cpu = wp.get_device(device).is_cpu
     knapsacks = Knapsacks()
-    # Threads of a GPU are frames: what neighbours read lies side by side.
-    knapsacks.benefits = (
-        wp.array(benefit, dtype=wp.float64, device=device, copy=False)
-        if on_cpu
-        else wp.array(np.ascontiguousarray(benefit.T), dtype=wp.float64, device=device).transpose()
-    )
     knapsacks.costs = wp.array(above, dtype=wp.float64, device=device)
     knapsacks.starts = wp.array(first, dtype=int, device=device)
     knapsacks.budgets = wp.array(spare, dtype=wp.float64, device=device)
     answers = Answers()
-    choices = wp.zeros((frames, objects) if on_cpu else (objects, frames), dtype=int, device=device)
-    answers.choices = choices if on_cpu else choices.transpose()
+    if on_cpu:
+        knapsacks.benefits = wp.array(benefit, dtype=wp.float64, device=device, copy=False)
+        answers.choices = wp.zeros((frames, objects), dtype=int, device=device)
+    else:
+        # Threads of a GPU are frames: what neighbours read and write lies side by side.
+        knapsacks.benefits = wp.array(np.ascontiguousarray(benefit.T), dtype=wp.float64, device=device).transpose()
+        answers.choices = wp.zeros((objects, frames), dtype=int, device=device).transpose()
     answers.values, answers.costs, answers.bounds, answers.prices = (
         wp.zeros(frames, dtype=wp.float64, device=device) for _ in range(4)
     )
@@ -568,21 +563,24 @@ def launch_select(
         wp.launch(_select, dim=slots, inputs=inputs, device=device)
 
     sizes = SlotSizes(0, ROWS * objects)
-    # `run_sliced` takes CHUNK for no wish, and would give a GPU all frames at once.
     most = CPU_LEVELS // max(1, len(cost)) if on_cpu else GPU_ENTRIES // max(1, objects)
-    chunk = max(1, min(CHUNK - 1 if on_cpu else GPU_SLOTS, most))
+    chunk = max(1, min(CHUNK if on_cpu else GPU_SLOTS, most))
+    if chunk == CHUNK and not on_cpu:
+        # By this `run_sliced` would give a GPU all frames at once; scratch may have no room for them.
+        chunk -= 1
     run_sliced(launch, frames, sizes, module=__name__, threads=threads, device=device, chunk=chunk)
-    return _selections(answers, choices.numpy() if on_cpu else choices.numpy().T, int(least.sum()), spare >= 0)
+    return _selections(answers, int(least.sum()), spare >= 0)
 
 
-def _selections(answers: Answers, choice: np.ndarray, least: int, feasible: np.ndarray) -> Selections:
+def _selections(answers: Answers, least: int, feasible: np.ndarray) -> Selections:
     """The frames' answers, with their gaps."""
     value, price = answers.values.numpy(), answers.prices.numpy()
     bound = np.where(feasible, answers.bounds.numpy(), np.nan)
     short, size = bound - value, np.abs(bound)
     gap = np.divide(short, size, out=np.where(short > 0, np.inf, short), where=size > 0)
     cost = answers.costs.numpy().astype(np.int64) + least
-    return Selections(np.ascontiguousarray(choice), value, cost, bound, gap, price, feasible)
+    choice = np.ascontiguousarray(answers.choices.numpy())
+    return Selections(choice, value, cost, bound, gap, price, feasible)
 
 
 def check_knapsacks(

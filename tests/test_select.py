@@ -171,6 +171,13 @@ def test_frames_threads_and_chunks_change_nothing(monkeypatch):
             assert np.array_equal(getattr(alone, field.name)[0], getattr(together, field.name)[n])
 
 
+@pytest.mark.gpu
+def test_a_gpu_changes_nothing():
+    benefits, costs, starts, _ = levels(200, 100, seed=6)
+    budgets = np.random.default_rng(6).integers(0, costs.reshape(-1, 5)[:, 4].sum(), 100)
+    assert equal(*(launch_select(benefits, costs, starts, budgets, device=d) for d in ("cpu", "cuda:0")))
+
+
 def test_units_change_nothing():
     """Benefits in other units (powers of two), costs from another zero."""
     benefits, costs, starts, budget = levels(80, 5, seed=7)
