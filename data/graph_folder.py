@@ -54,7 +54,7 @@ def read_graph(folder: Path, grid_m: float = GRID_M, *, disjoint: bool = True) -
     metres = numbers(table, CELL_COLUMNS[1:], cells_path).reshape(-1, 2, 3)[np.argsort(ids)]
     cells, moved = _snap(metres, grid_m, cells_path)
     order = np.argsort(ids)
-    inhabitable = optional_column(table, "inhabitable", True)[order].astype(bool)
+    inhabitable = inhabitable_column(table, cells_path)[order]
     names = optional_column(table, "name", "")[order]
     portals = read_table(portals_path, PORTAL_COLUMNS)
     ends = numbers(portals, ("cell_a", "cell_b", "axis"), portals_path).astype(np.int64)
@@ -71,6 +71,19 @@ def optional_column(table: pa.Table, name: str, default: object) -> np.ndarray:
     if name in table.column_names:
         return np.array([default if value is None else value for value in table[name].to_pylist()], object)
     return np.full(table.num_rows, default, object)
+
+
+def inhabitable_column(table: pa.Table, path: str | Path) -> np.ndarray:
+    """Whether each cell may be an observer's: true where nothing is said, shape (rows,), bool.
+
+    Raises:
+        InputError: a value is neither true nor false.
+    """
+    values = optional_column(table, "inhabitable", True)
+    bad = [value for value in values if value not in (True, False)]
+    if bad:
+        raise InputError(f"{path}: expected true or false as inhabitable, found {bad[0]!r}")
+    return values.astype(bool)
 
 
 def _snap(metres: np.ndarray, grid_m: float, path: Path) -> tuple[np.ndarray, float]:

@@ -14,7 +14,7 @@ import pyarrow.csv
 
 from .errors import InputError
 from .graph import CellGraph
-from .graph_folder import CELL_COLUMNS, numbers, optional_column
+from .graph_folder import CELL_COLUMNS, inhabitable_column, numbers, optional_column
 from .opaque import OpaquePlanes
 from .scene import GRID_LIMIT, Scene
 from .scene_folder import one_line, read_table
@@ -113,8 +113,7 @@ def view_cells(
         raise InputError(
             f"{where}: expected view cells within {AROUND_M:g} m of the model, found cell {ids[away[0]]} outside"
         )
-    names, inhabitable = optional_column(table, "name", ""), optional_column(table, "inhabitable", True)
-    return ViewCells(as_graph(cells, names, inhabitable.astype(bool)), ids)
+    return ViewCells(as_graph(cells, optional_column(table, "name", ""), inhabitable_column(table, where)), ids)
 
 
 def _cell_ids(table: pa.Table, where: str) -> np.ndarray:

@@ -1,5 +1,6 @@
 """`viewcell check`: finds what is planted in anybody's sets, nothing in true ones, and says how sure it is."""
 
+import dataclasses
 import json
 import runpy
 import subprocess
@@ -14,17 +15,19 @@ import pytest
 import viewcell
 from scipy.spatial import cKDTree
 from viewcell import InputError
+from viewcell.data.claims import Claims
 from viewcell.data.database import cells_table
 from viewcell.data.scene import Role
 from viewcell.data.scene_folder import write_scene
 from viewcell.data.view_cells import view_cells
 from viewcell.verify.again import SecondLook
+from viewcell.verify.check_result import WrongPair
 from viewcell.verify.clearance import clearances
 from viewcell.verify.confidence import Confidence
 from viewcell.verify.free_space import FreeSpace
 from viewcell.verify.sightline import Sightlines
 from viewcell.verify.surfaces import Targets
-from viewcell.workbench.check import assert_conservative, check
+from viewcell.workbench.check import _Hunt, assert_conservative, check
 from viewcell.workbench.cli import main
 
 HOUSE = runpy.run_path(str(Path(__file__).with_name("small_house.py")))
@@ -241,6 +244,34 @@ def test_bad_cells_are_refused(house, claims, change, words):
     rows[0].update(change)
     with pytest.raises(InputError, match=words):
         check(house.scene, claims[0], pa.Table.from_pylist(rows), rays=RAYS)
+
+
+def test_words_are_no_flags(house, claims):
+    table = boxes_of(house)
+    words = pa.array(["yes" if flag else "no" for flag in table["inhabitable"].to_pylist()])
+    with pytest.raises(InputError, match="cells: expected true or false as inhabitable, found 'yes'"):
+        check(house.scene, claims[0], table.set_column(7, "inhabitable", words), rays=RAYS)
+
+
+def test_a_narrow_sightline_is_told(house, claims):
+    """The desk alone is 0.3 of a step off the grid, so a sightline through a slit may be there by snapping only."""
+    result = check(house.scene, without(claims[0], 2), boxes_of(house), rays=RAYS)
+    assert not result.notes
+    objects = [*house.scene.objects]
+    transform = objects[-2].transform.copy()
+    transform[0, 3] += 0.3 * GRID
+    objects[-2] = dataclasses.replace(objects[-2], transform=transform)
+    scene = dataclasses.replace(house.scene, objects=objects)
+    result = check(scene, without(claims[0], 2), boxes_of(house), rays=RAYS)
+    assert result.wrong and result.snap_m == pytest.approx(0.3 * GRID) and not result.notes
+    result.wrong[:] = []
+    hunt = _Hunt(
+        scene, view_cells(boxes_of(house), scene, "cells", inwards=True), Claims(house.potential_objects), RAYS, 0
+    )
+    # From a corner of room 2 along its wall, a tenth of a step off it.
+    hunt.result.wrong.append(WrongPair("cell", 2, 2, np.array([3000.0, 0.1, 900]), np.array([4000.0, 0.1, 900])))
+    hunt.measure()
+    assert "1 sightline cleared everything by less than vertices were moved" in hunt.result.table()
 
 
 def test_cells_inside_solids_are_refused(house):

@@ -54,8 +54,8 @@ def check(
     """Look for visible things that claimed sets hide.
 
     Args:
-        model: a scene, or a path: whatever `read` takes, a bake folder, or a folder of cells.parquet and
-            portals.parquet, which is judged by its portals.
+        model: a scene, or a path: whatever `read` takes, a bake folder, a folder of cells.parquet and portals.parquet,
+            or a compiled map (.bsp with its .prt, or .prt); the last two are judged by their portals.
         pvs: what is claimed to be potentially visible: a table or matrix as `data.claims.read_claims` takes it, or
             several in a list.
         cells: view cells: a table of boxes (a path, or anything that pyarrow makes a table of) in the model's own
@@ -326,3 +326,9 @@ class _Hunt:
         for k, pair in enumerate(part):
             near = [(int(o), float(d)) for o, d in zip(objects[k], distances[k], strict=True) if o >= 0]
             self.result.wrong[k] = replace(pair, margin=float(distances[k, 0]), nearest=tuple(near))
+        narrow = int((distances[:, 0] * self.result.grid_m < self.result.snap_m).sum())
+        if narrow:
+            self.result.notes.append(
+                f"{counted(narrow, 'sightline')} cleared everything by less than vertices were moved to the grid "
+                f"({1e3 * self.result.snap_m:.2g} mm); without snapping something may be in the way"
+            )
