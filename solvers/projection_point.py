@@ -207,9 +207,9 @@ def solve_points(problems: list[Problem]) -> Result:
     """Projection points of clusters, all at once, by an interior point method (JAX, float64).
 
     Every point is in front of all occluders of its cluster, exactly; where the optimum is not, the cell's centre is
-    given instead. Rows that the optimum violates by the method's tolerance are kept by a step towards the centre;
-    `primal` says what the rounding of that step leaves. So it is where nothing is to be solved. Where optima fill a line or a face, as with parallel
-    occluders, the point is in the middle of them, as far as the barrier of the rows goes.
+    given instead, and so it is where nothing is to be solved. Rows that the optimum violates by the method's tolerance
+    are kept by a step towards the centre; `primal` says what the rounding of that step leaves. Where optima fill a line
+    or a face, as with parallel occluders, the point is in the middle of them, as far as the barrier of the rows goes.
     """
     begin = time.perf_counter()
     count = len(problems)
