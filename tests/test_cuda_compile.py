@@ -16,6 +16,7 @@ MODULES = (
     "backface",
     "select",
     "shadow",
+    "raster",
 )
 HOPPER = 90
 
