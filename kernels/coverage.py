@@ -380,6 +380,12 @@ def _launch_reduce(maps: Maps, size: int, level: int, threads: int, device: str)
     run_sliced(reduce, count, SlotSizes(1, 1), module=__name__, threads=threads, device=device)
 
 
+def check_resolution(resolution: int) -> None:
+    """Refuse a cube map's resolution that is not a power of two from 2 to 4096 with an InputError."""
+    if not 2 <= resolution <= MAX_RESOLUTION or resolution & (resolution - 1):
+        raise InputError(f"resolution: expected a power of two, 2 to {MAX_RESOLUTION}, found {resolution}")
+
+
 def _check(points: np.ndarray, corners: np.ndarray, starts: np.ndarray, owners: np.ndarray, resolution: int) -> None:
     """Raise InputError unless the arguments of `launch_coverage` fit together."""
     if points.ndim != 2 or points.shape[1] != 3 or corners.ndim != 2 or corners.shape[1] != 3:
@@ -393,8 +399,7 @@ def _check(points: np.ndarray, corners: np.ndarray, starts: np.ndarray, owners: 
         raise InputError(f"polygon {short}: expected at least 3 corners, found {int(np.diff(starts)[short])}")
     if len(owners) and (owners.min() < 0 or owners.max() >= len(points)):
         raise InputError(f"owners: expected maps 0 to {len(points) - 1}, found {owners.min()} to {owners.max()}")
-    if not 2 <= resolution <= MAX_RESOLUTION or resolution & (resolution - 1):
-        raise InputError(f"resolution: expected a power of two, 2 to {MAX_RESOLUTION}, found {resolution}")
+    check_resolution(resolution)
 
 
 def _project_polygons(

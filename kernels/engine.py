@@ -32,9 +32,10 @@ from .cell_visibility import (
 from .flood import launch_flood
 from .ledger import Ledger
 from .object_visibility import ObjectModel, ObjectRows, object_rows
-from .occlusion import Occlusion, device_occluders, hidden_boxes, refine_objects, seen_objects
+from .occlusion import Occlusion, device_occluders, hidden_boxes, look_at_objects, refine_objects, seen_objects
 from .sightline import AimTargets, Triangles, aim_targets, device_triangles
 from .target import TargetAnswers
+from .vlod import VlodSettings, join_outlines, rectangle_outlines, vlod_hidden
 
 # A flood is tried on this many sources first; where more than a quarter run into the cap, sequences explode.
 SAMPLE = 24
@@ -348,6 +349,7 @@ class ViewCellEngine:
         method: str = "occluders",
         portal_graph: CellGraph | None = None,
         certify: bool = False,
+        vlod: VlodSettings | None = None,
     ) -> None:
         """Copy what visibility needs to the device; arguments as of `Engine`, the graph without portals.
 
@@ -358,11 +360,14 @@ class ViewCellEngine:
             seed: of the random sightlines.
             threads: CPU threads.
             device: Warp device.
-            method: "occluders"; "portals", "both" to hide what no line between live cells of `portal_graph` reaches.
+            method: "occluders"; "vlod" for those of kernels/vlod.py; "portals", "both" to hide what no line between
+                live cells of `portal_graph` reaches.
             portal_graph: cells and portals of the model.
             certify: call hidden only what has a certificate, and keep it; all methods then hide by occluders alone.
+            vlod: how the method "vlod" treats view cells.
         """
         self._certify = certify
+        self._vlod = vlod if method == "vlod" and not certify else None
         self.object_count = len(scene.objects)
         self._solids = closed_elements(scene)
         sights = Sights(scene, opaque, graph.cells, device)
@@ -384,9 +389,23 @@ class ViewCellEngine:
 
     def visible(self, block: np.ndarray, *, aim: bool = True) -> Part:
         """Rows of some view cells; without `aim` the same pairs are hidden and fewer of the others are seen."""
+        if self._vlod is not None:
+            return Part(None, self._by_projection_points(block, aim))
         ledger = Ledger() if self._certify else None
         rows, proofs = seen_objects(self.model, block, occlusion.AIM_ROUNDS if aim else (), ledger)
         return Part(None, rows, proofs)
+
+    def _by_projection_points(self, block: np.ndarray, aim: bool) -> ObjectRows:
+        """What shrunk occluders do not hide, with the witnesses that were found."""
+        model, (_, regions, patches) = self.model, self.occluders
+        outlines = join_outlines(rectangle_outlines(regions.boxes), patches)
+        owners = np.repeat(np.arange(self.object_count), np.diff(model.occludees.starts))
+        options = {"objects": self.object_count, "threads": model.threads, "device": model.device}
+        hidden, _ = vlod_hidden(model.cells[block], outlines, model.occludees.pieces, owners, self._vlod, **options)
+        rows, target = np.nonzero(~hidden)
+        rows = ObjectRows.unseen(block[rows], target)
+        look_at_objects(model, rows, occlusion.AIM_ROUNDS if aim else ())
+        return rows
 
     def unknown(self, block: np.ndarray) -> Part:
         """Rows that claim nothing: every object stays potential."""
@@ -399,9 +418,7 @@ class ViewCellEngine:
 
 def unknown_objects(block: np.ndarray, count: int) -> ObjectRows:
     """Every object from every cell of the block, without a witness."""
-    source, target = np.repeat(block, count), np.tile(np.arange(count), len(block))
-    places = np.zeros((len(source), 3))
-    return ObjectRows(source, target, np.zeros(len(source), bool), places, places)
+    return ObjectRows.unseen(np.repeat(block, count), np.tile(np.arange(count), len(block)))
 
 
 def relabelled(part: Part, places: np.ndarray) -> Part:
@@ -469,5 +486,4 @@ def flat_area(extent: np.ndarray) -> np.ndarray:
 
 def no_objects() -> ObjectRows:
     """Rows of a bare graph, which has no objects."""
-    none, places = np.zeros(0, int), np.zeros((0, 3))
-    return ObjectRows(none, none, np.zeros(0, bool), places, places)
+    return ObjectRows.unseen(np.zeros(0, int), np.zeros(0, int))

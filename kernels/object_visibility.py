@@ -32,6 +32,11 @@ class ObjectRows:
     origin: np.ndarray
     end: np.ndarray
 
+    @classmethod
+    def unseen(cls, source: np.ndarray, target: np.ndarray) -> "ObjectRows":
+        """Pairs without a witness."""
+        return cls(source, target, np.zeros(len(source), bool), *np.zeros((2, len(source), 3)))
+
 
 @dataclass
 class ObjectModel:
@@ -56,7 +61,7 @@ def object_rows(
     part_source = np.repeat(reached.source, sizes)
     keys, pair_of = np.unique(_key(part_source, incidence.object_id[parts], len(objects.ranges)), return_inverse=True)
     source, target = np.divmod(keys, len(objects.ranges))
-    rows = ObjectRows(source, target, np.zeros(len(keys), bool), np.zeros((len(keys), 3)), np.zeros((len(keys), 3)))
+    rows = ObjectRows.unseen(source, target)
     cells = model.graph.cells
     everything = np.arange(len(keys))
     aim_at_objects(

@@ -100,11 +100,8 @@ def seen_objects(
     occludees = model.occludees
     hide = partial(_hide_nodes, model, ledger)
     source, target = descend(model.cells, block, occludees.levels, occludees.objects, FIRST_LEVEL, hide)
-    count = len(source)
-    rows = ObjectRows(source, target, np.zeros(count, bool), np.zeros((count, 3)), np.zeros((count, 3)))
-    bounds = occludees.bounds[target]
-    middles = np.stack([model.cells[source].mean(axis=1), bounds.mean(axis=1)], axis=1)
-    aim_at_objects(model, model.cells, model.ranges, rows, np.arange(count), bounds, middles, target, FIRST_TRIES, 0)
+    rows = ObjectRows.unseen(source, target)
+    look_at_objects(model, rows, ())
     return refine_objects(model, rows, aim_rounds, ledger)
 
 
@@ -124,6 +121,23 @@ def refine_objects(
     kept = np.flatnonzero(potential)
     proofs = None if ledger is None else ledger.close(~potential)
     return ObjectRows(rows.source[kept], rows.target[kept], rows.seen[kept], rows.origin[kept], rows.end[kept]), proofs
+
+
+def look_at_objects(model: Occlusion, rows: ObjectRows, aim_rounds: tuple[int, ...] = AIM_ROUNDS) -> None:
+    """Shoot at the objects of rows, then at the pieces of those not seen; fills seen, origin and end in place."""
+    bounds = model.occludees.bounds[rows.target]
+    middles = np.stack([model.cells[rows.source].mean(axis=1), bounds.mean(axis=1)], axis=1)
+    everything = np.arange(len(rows.source))
+    aim_at_objects(model, model.cells, model.ranges, rows, everything, bounds, middles, rows.target, FIRST_TRIES, 0)
+    starts = model.occludees.starts
+    for number, tries in enumerate(aim_rounds):
+        todo = np.flatnonzero(~rows.seen)
+        sizes = np.minimum(starts[rows.target[todo] + 1] - starts[rows.target[todo]], OPEN_ENOUGH)
+        pairs = np.repeat(todo, sizes)
+        piece = np.arange(len(pairs)) - np.repeat(np.cumsum(sizes) - sizes - starts[rows.target[todo]], sizes)
+        boxes = model.occludees.pieces[piece]
+        lines = np.stack([model.cells[rows.source[pairs]].mean(axis=1), boxes.mean(axis=1)], axis=1)
+        aim_at_objects(model, model.cells, model.ranges, rows, pairs, boxes, lines, piece, tries, number + 1)
 
 
 def hidden_boxes(model: Occlusion, source: np.ndarray, boxes: np.ndarray, ledger: Ledger | None = None) -> np.ndarray:

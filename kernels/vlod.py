@@ -19,7 +19,7 @@ import numpy as np
 from ..data.errors import InputError
 from ..data.patches import Patches
 from ..data.scene import GRID_LIMIT
-from .coverage import launch_coverage
+from .coverage import check_resolution, launch_coverage
 from .occludee import launch_occludees
 from .shadow import USABLE, Umbras, launch_shrink, launch_umbra
 
@@ -58,6 +58,7 @@ class VlodSettings:
             raise InputError(f"clusters: expected one of {CLUSTERS}, found {self.clusters}")
         if self.objective not in OBJECTIVES:
             raise InputError(f"objective: expected one of {OBJECTIVES}, found {self.objective!r}")
+        check_resolution(self.resolution)
         if self.shells < 0 or self.split < 1 or self.occluders < 0:
             found = f"{self.shells}, {self.split}, {self.occluders}"
             raise InputError(f"shells, split, occluders: expected at least 0, 1 and 0, found {found}")

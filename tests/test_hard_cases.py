@@ -260,6 +260,7 @@ BROKEN = {
     "bake portals": ("bake", HidingBake),
     "bake occluders": ("bake", HidingBake),
     "bake both": ("bake", HidingBake),
+    "bake vlod": ("bake", HidingBake),
 }
 
 

@@ -11,6 +11,7 @@ from viewcell.data.errors import InputError
 from viewcell.data.view_cells import as_graph
 from viewcell.kernels.engine import Sights
 from viewcell.kernels.occlusion import seen_objects
+from viewcell.verify.witness import visible_rows
 from viewcell.workbench.bake import Settings, bake, opaque_rectangles
 from viewcell.workbench.cli import main
 from viewcell.workbench.report import report
@@ -75,6 +76,16 @@ def test_both_is_at_least_as_tight_as_either(office, cells, by_occluders, tmp_pa
     assert not (both.potential_objects & ~portals.potential_objects).any()
     assert not (both.potential_objects & ~by_occluders.potential_objects).any()
     assert verify(both, rays=100_000).ok and verify(portals, rays=100_000).ok
+
+
+def test_projection_points_hide_nothing_seen_and_less_than_occluders(office, cells, by_occluders, tmp_path):
+    made = bake(office, tmp_path / "v.bake", settings=Settings(method="vlod", cells=cells, clusters=6), threads=1)
+    tables = by_occluders.cell_to_object, made.cell_to_object
+    for rows in (visible_rows(table) for table in tables):
+        assert made.potential_objects[rows["cell_id"].to_numpy(), rows["object_id"].to_numpy()].all()
+    counts = made.potential_objects.sum(), by_occluders.potential_objects.sum()
+    assert counts[1] < counts[0] < 0.8 * made.potential_objects.size
+    assert verify(made, rays=100_000).ok
 
 
 def test_both_on_portal_cells_hides_no_less_and_sees_no_less(tmp_path):
@@ -174,12 +185,19 @@ def test_damaged_meshes_lose_occlusion_never_safety(damage, tmp_path):
         ({"refine_gap": -1.0}, "refine-gap"),
         ({"refine_triangles": 0}, "refine-triangles"),
         ({"method": "occluders", "cells": "nowhere.parquet"}, "nowhere.parquet"),
+        ({"method": "vlod", "clusters": 5}, "clusters"),
+        ({"method": "vlod", "resolution": 100}, "resolution: expected a power of two"),
     ],
 )
 def test_unusable_settings_are_refused(office, settings, wanted, tmp_path):
     with pytest.raises(InputError, match=wanted):
         bake(office, tmp_path / "no.bake", settings=Settings(**settings))
     assert not list(tmp_path.iterdir())
+
+
+def test_the_method_of_projection_points_wants_view_cells(office, tmp_path):
+    with pytest.raises(InputError, match="cells: expected octree or a table"):
+        bake(office, tmp_path / "no.bake", settings=Settings(method="vlod", cells="portals"))
 
 
 def test_bare_graphs_have_no_occluders(graph, tmp_path, capsys):

@@ -30,13 +30,14 @@ from ..data.view_cells import as_graph, octants, octree_roots, read_view_cells, 
 
 if TYPE_CHECKING:
     from ..kernels.engine import Engine, Part, ViewCellEngine
+    from ..kernels.vlod import VlodSettings
 
 MARGIN_M = 2.0
 # Sources a block: a block is what an interrupted bake resumes from.
 BLOCK = 24
 # Of view cells, whose sets are larger.
 VIEW_BLOCK = 8
-METHODS = ("auto", "portals", "occluders", "both")
+METHODS = ("auto", "portals", "occluders", "both", "vlod")
 # Models with more triangles than this are not cut into portal cells unless asked.
 PORTAL_TRIANGLES = 3_000_000
 DEEPEST = 12
@@ -52,14 +53,18 @@ class Settings:
         seal: cracks narrower than this are closed [m]; 0 closes none.
         doors: "open", or "closed" if doors occlude.
         method: "portals" (stabbing lines through a cell-and-portal graph), "occluders" (shadows of walls, furniture and
-            oblique surfaces), "both", or "auto": portals, and occluders for cells where portals leave much unknown, and
-            for models too large to be cut into cells.
+            oblique surfaces), "both", "vlod" (the method of Chhugani et al. 2005: projection points and shrunk
+            occluders), or "auto": portals, and occluders for cells where portals leave much unknown, and for models too
+            large to be cut into cells.
         cells: view cells: "portals" for those of the graph, "octree", or a table of boxes. By default the method's own.
         cell_size_m: of the octree's roots.
         depth: times that a cell of the octree may be refined.
         refine_triangles: a cell that may see more triangles is refined.
         refine_gap: a cell is refined if a larger share of what it may see is unknown.
         certify: store a certificate of everything that is hidden, and call nothing else hidden.
+        clusters: of occluders by direction, for "vlod"; see `viewcell.kernels.vlod.VlodSettings`.
+        objective: of projection points, for "vlod".
+        resolution: of cube maps, for "vlod".
     """
 
     threshold_m2: float = 0.0
@@ -73,6 +78,9 @@ class Settings:
     refine_triangles: int = 100_000
     refine_gap: float = 0.25
     certify: bool = False
+    clusters: int = 26
+    objective: str = "socp"
+    resolution: int = 512
 
 
 @dataclass
@@ -177,7 +185,7 @@ class _Prepared:
 def _prepare(scene: Scene | None, graph_folder: Path | None, settings: Settings, clock: Clock) -> _Prepared:
     """Cells of a model, or of a bare graph."""
     if scene is None:
-        if settings.method in ("occluders", "both") or settings.cells not in ("", "portals"):
+        if settings.method in ("occluders", "both", "vlod") or settings.cells not in ("", "portals"):
             raise InputError(f"{graph_folder}: expected a model for occluders and view cells, found a bare graph")
         graph, snapped = read_graph(graph_folder)
         clock.lap("read")
@@ -191,14 +199,17 @@ def _prepare(scene: Scene | None, graph_folder: Path | None, settings: Settings,
     cells, method = settings.cells, settings.method
     large = len(scene.triangles()[0]) > PORTAL_TRIANGLES
     if not cells:
-        cells = "octree" if method == "occluders" or (method == "auto" and large) else "portals"
+        cells = "octree" if method in ("occluders", "vlod") or (method == "auto" and large) else "portals"
+    if cells == "portals" and method == "vlod":
+        raise InputError("cells: expected octree or a table for the method vlod, found portals")
     if cells == "portals":
         graph, opaque, notes = build_graph(scene, settings, clock)
         return _Prepared(scene, graph, opaque, facts | notes, False, method)
     if method == "auto":
         method = "occluders"
     # With certificates nothing is hidden by portals alone: the model is what a proof is checked against.
-    portal_graph = build_graph(scene, settings, clock)[0] if method != "occluders" and not settings.certify else None
+    wanted = method in ("portals", "both") and not settings.certify
+    portal_graph = build_graph(scene, settings, clock)[0] if wanted else None
     opaque = opaque_rectangles(scene)
     if cells == "octree":
         roots = octree_roots(scene, settings.cell_size_m)
@@ -256,10 +267,22 @@ def _check(settings: Settings, budget_s: float | None, threads: int | None, devi
 
     # Warp greets whoever starts it, unless told not to before.
     wp.config.log_level = wp.LOG_WARNING
+    _vlod_settings(settings)
     try:
         wp.get_device(device)
     except Exception as error:  # Warp raises several types for an unknown or absent device
         raise InputError(f"device: expected one that Warp knows, found {device!r} ({error})") from None
+
+
+def _vlod_settings(settings: Settings) -> "VlodSettings":
+    """How the method "vlod" treats view cells.
+
+    Raises:
+        InputError: clusters, objective or resolution.
+    """
+    from ..kernels.vlod import VlodSettings
+
+    return VlodSettings(settings.clusters, settings.objective, settings.resolution, seed=settings.seed)
 
 
 def _open(model: Scene | str | Path, settings: Settings) -> tuple[Scene | None, Path | None]:
@@ -374,7 +397,8 @@ def _visibility(
     options = {"seed": settings.seed, "threads": thread_count(threads), "device": device, "method": prepared.method}
     options["certify"] = settings.certify
     if prepared.view_cells:
-        engine = ViewCellEngine(scene, graph, prepared.opaque, portal_graph=prepared.portal_graph, **options)
+        options["portal_graph"], options["vlod"] = prepared.portal_graph, _vlod_settings(settings)
+        engine = ViewCellEngine(scene, graph, prepared.opaque, **options)
     else:
         engine = Engine(scene, graph, prepared.opaque, **options)
     clock.lap("prepare")

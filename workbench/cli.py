@@ -157,9 +157,10 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
     bake.add_argument("--out", metavar="BAKE", help="folder to write; MODEL's name with .bake by default")
     bake.add_argument(
         "--method",
-        choices=["auto", "portals", "occluders", "both"],
+        choices=["auto", "portals", "occluders", "both", "vlod"],
         default="auto",
-        help="what proves things hidden; auto, the default: portals in rooms, occluders where they fall short",
+        help="what proves things hidden; auto, the default: portals in rooms, occluders where they fall short; "
+        "vlod: projection points, to compare and to tune",
     )
     bake.add_argument(
         "--cells",

@@ -538,4 +538,5 @@ KERNELS: dict[str, Callable[[HardCases, str], Outcomes]] = {
     "bake portals": _bake("portals"),
     "bake occluders": _bake("occluders"),
     "bake both": _bake("both"),
+    "bake vlod": _bake("vlod"),
 }
