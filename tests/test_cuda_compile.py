@@ -17,6 +17,7 @@ MODULES = (
     "select",
     "shadow",
     "raster",
+    "deviation",
 )
 HOPPER = 90
 

@@ -24,6 +24,7 @@ TWINS = {
     "launch_shrink": ("shadow", "shadow_exact.shrunk", "test_shadow.py"),
     "launch_grow_hole": ("shadow", "shadow_exact.grown_hole", "test_shadow.py"),
     "launch_occludees": ("occludee", "coverage_exact.covers_box", "test_coverage.py"),
+    "launch_deviation": ("deviation", "deviation_exact.deviation_squared", "test_deviation.py"),
     "launch_select": ("select", "knapsack_exact.best_by_table", "test_select.py"),
     "launch_raster": ("raster", "raster_exact.first_hit", "test_raster.py"),
 }
