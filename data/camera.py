@@ -16,6 +16,8 @@ NEAR_M = 0.01
 # Rectangles on the screen are this much larger than computed [pixels]: far more than float64 errs.
 ROUNDING_PIXELS = 1.0e-3
 PIXELS_MOST = 2**26
+# Rays across a rectangle, each way, to tell how much of it a box covers.
+RAYS = 8
 CORNERS = np.array(list(product((0, 1), repeat=3)))
 EDGES = np.array([(a, b) for a in range(8) for b in range(a) if np.abs(CORNERS[a] - CORNERS[b]).sum() == 1])
 
@@ -123,3 +125,33 @@ def on_screen(screen: Screen, rectangles: np.ndarray) -> tuple[np.ndarray, np.nd
     half = np.array([screen.width, screen.height]) / 2
     cut = np.stack([np.maximum(rectangles[:, 0], -half), np.minimum(rectangles[:, 1], half)], axis=1)
     return cut, (cut[:, 0] <= cut[:, 1]).all(axis=1)
+
+
+def covered_pixels(
+    screen: Screen, eyes: np.ndarray, axes: np.ndarray, boxes: np.ndarray, rectangles: np.ndarray
+) -> np.ndarray:
+    """About how many pixels boxes cover: the area of their rectangles times the share of 8 x 8 rays that meet the box.
+
+    Args:
+        screen: gives the focal length.
+        eyes: as for `project_boxes`.
+        axes: likewise.
+        boxes: likewise.
+        rectangles: cut to the screen, of `on_screen`, shape (n, 2, 2).
+
+    Returns:
+        Shape (n,), float64, at least 1.
+    """
+    area = (rectangles[:, 1] - rectangles[:, 0]).prod(axis=1)
+    hits = np.zeros(len(boxes))
+    low, high = boxes[:, 0] - eyes, boxes[:, 1] - eyes
+    steps = (np.arange(RAYS) + 0.5) / RAYS
+    for u, v in product(steps, steps):
+        pixel = rectangles[:, 0] + (rectangles[:, 1] - rectangles[:, 0]) * [u, v]
+        rays = np.einsum("ni,nij->nj", np.column_stack([pixel, np.full(len(pixel), screen.focal)]), axes)
+        # A ray along a face's plane must not divide by 0.
+        rays = np.where(np.abs(rays) < 1e-12, 1e-12, rays)
+        enter = np.minimum(low / rays, high / rays).max(axis=1)
+        leave = np.maximum(low / rays, high / rays).min(axis=1)
+        hits += (leave >= enter) & (leave > 0)
+    return np.maximum(area * hits / RAYS**2, 1.0)

@@ -107,6 +107,7 @@ def bake(
     device: str = "cpu",
     overwrite: bool = False,
     progress: bool = False,
+    tuned: dict[str, dict] | None = None,
 ) -> Bake:
     """Cut a model into cells and portals and compute what each inhabitable cell can see.
 
@@ -120,6 +121,7 @@ def bake(
         device: Warp device. The answer does not depend on it.
         overwrite: replace a finished bake at `out` even if it is up to date.
         progress: show a progress bar.
+        tuned: what `viewcell tune` has found for those who walk through the bake, by name; stored in the manifest.
 
     Returns:
         The bake. Absent rows are hidden, exactly; `unknown` rows are kept.
@@ -136,7 +138,7 @@ def bake(
         raise InputError(f"{out}: expected a new name or a bake folder to replace, found something else there")
     print_ = _fingerprint(scene, graph_folder, settings)
     if not overwrite and (done := _finished(out, print_)) is not None:
-        return done
+        return _with_tuned(done, tuned or {})
     prepared = _prepare(scene, graph_folder, settings, clock)
     graph, facts = prepared.graph, prepared.facts
     if not graph.inhabitable.any():
@@ -145,7 +147,7 @@ def bake(
         prepared, settings, out, print_, clock, budget_s, threads, device, progress
     )
     graph = prepared.graph
-    facts["budget_spent"] = spent
+    facts |= {"budget_spent": spent, **(tuned or {})}
     if scene is not None and not spent:
         facts["counts"] = facts["counts"] | _triangle_counts(scene, graph, object_rows, threads, device)
         clock.lap("back faces")
@@ -340,6 +342,17 @@ def _finished(out: Path, print_: str) -> Bake | None:
         return None
     same = manifest.get("fingerprint") == print_ and manifest.get("complete") and not manifest.get("budget_spent")
     return Bake(out, manifest) if same else None
+
+
+def _with_tuned(done: Bake, tuned: dict[str, dict]) -> Bake:
+    """A finished bake whose manifest says what has been tuned; the tables do not depend on it."""
+    if all(done.manifest.get(name) == part for name, part in tuned.items()):
+        return done
+    manifest = done.manifest | tuned
+    temporary = done.folder / ".manifest.writing"
+    temporary.write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
+    temporary.rename(done.folder / "manifest.json")
+    return Bake(done.folder, manifest)
 
 
 def build_graph(scene: Scene, settings: Settings, clock: Clock) -> tuple[CellGraph, OpaquePlanes, dict]:

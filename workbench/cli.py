@@ -15,6 +15,19 @@ from ..data.errors import InputError
 FAILED, UNUSABLE, INTERRUPTED = 1, 2, 130
 # Seeds go to kernels as int32.
 SEED_LIMIT = 2**31
+# Options of `bake` that are settings, by their names in the parser and in Settings.
+BAKE_SETTINGS = {
+    "threshold": "threshold_m2",
+    "seed": "seed",
+    "doors": "doors",
+    "method": "method",
+    "cells": "cells",
+    "cell_size": "cell_size_m",
+    "depth": "depth",
+    "refine_triangles": "refine_triangles",
+    "refine_gap": "refine_gap",
+    "certify": "certify",
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -115,6 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_bake(commands)
     _add_verify(commands)
     _add_check(commands)
+    _add_tune(commands)
     _add_report(commands)
     return parser
 
@@ -197,6 +211,13 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
     bake.add_argument("--device", default="cpu", help="Warp device, such as cuda:0; cpu by default")
     bake.add_argument("--overwrite", action="store_true", help="bake again even if BAKE is up to date")
     bake.add_argument("--no-progress", action="store_true", help="no progress bar")
+    bake.add_argument(
+        "--settings",
+        metavar="FILE",
+        help="JSON with keys of Settings, or a file that viewcell tune has written; options given here go before it",
+    )
+    # What is not given is left to the settings file, or to Settings.
+    bake.set_defaults(**dict.fromkeys(BAKE_SETTINGS))
 
 
 def _add_verify(commands: argparse._SubParsersAction) -> None:
@@ -249,6 +270,55 @@ def _add_check(commands: argparse._SubParsersAction) -> None:
     check.add_argument("--replay", metavar="FOLDER", help="judge the sightlines in an earlier check's folder again")
     check.add_argument("--no-progress", action="store_true", help="no progress bar")
     _seed(check, "rays")
+
+
+def _resolution(text: str) -> tuple[int, int]:
+    """Reads WIDTHxHEIGHT."""
+    parts = text.lower().split("x")
+    try:
+        width, height = (int(part) for part in parts)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT in pixels, found {text!r}") from None
+    return width, height
+
+
+def _numbers(text: str) -> list[float]:
+    """Reads numbers separated by commas."""
+    return [_number(part) for part in text.split(",")]
+
+
+def _add_tune(commands: argparse._SubParsersAction) -> None:
+    tune = commands.add_parser("tune", help="try settings on your own model", description="Try settings on a model.")
+    solvers = tune.add_subparsers(title="solvers", metavar="SOLVER", required=True)
+    _add_tune_lod(solvers)
+
+
+def _add_tune_lod(solvers: argparse._SubParsersAction) -> None:
+    lod = _command(solvers, "lod", "tune_lod", "Try ways to choose levels of detail along a path through a bake.")
+    lod.add_argument("bake", metavar="BAKE", help="bake folder of a model")
+    lod.add_argument("--frames", type=_whole(1, 100_000), default=300, help="of the walk; 300 by default")
+    lod.add_argument(
+        "--budget-ms", type=_numbers, metavar="MS,MS", help="frame times to aim at; three telling ones by default"
+    )
+    lod.add_argument(
+        "--resolution", type=_resolution, default=(640, 480), metavar="WxH", help="in pixels; 640x480 by default"
+    )
+    lod.add_argument("--fov", type=_number, default=60.0, metavar="DEG", help="vertical field of view; 60 by default")
+    lod.add_argument(
+        "--path", metavar="FILE", help="recorded path: a Parquet or CSV table of x, y, z, yaw, pitch, t; else a walk"
+    )
+    lod.add_argument(
+        "--samples",
+        metavar="FILE",
+        help="frames measured with your renderer: a Parquet or CSV table of primitives, pixels, seconds and perhaps "
+        "objects; by default the software renderer is measured",
+    )
+    lod.add_argument(
+        "--always", type=lambda text: text.split(","), default=[], metavar="KIND,KIND", help="kinds never left out"
+    )
+    lod.add_argument("--out", metavar="FOLDER", help="folder to write; BAKE's name with .tune by default")
+    lod.add_argument("--no-progress", action="store_true", help="no progress bar")
+    _seed(lod, "the walk and the sampled frames")
 
 
 def _add_report(commands: argparse._SubParsersAction) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..data.errors import InputError
-from .cli import FAILED, say
+from .cli import BAKE_SETTINGS, FAILED, say
 from .summary import summary, table
 
 if TYPE_CHECKING:
@@ -68,21 +68,15 @@ def bake(options: argparse.Namespace) -> int:
     """Bake a model and print what came of it."""
     from .bake import Settings, default_out
     from .bake import bake as compute
+    from .settings_file import SettingsFile, read_settings
 
     _start_warp()
     model = Path(options.model)
-    settings = Settings(
-        threshold_m2=options.threshold,
-        seed=options.seed,
-        doors=options.doors or "open",
-        method=options.method,
-        cells=options.cells,
-        cell_size_m=options.cell_size,
-        depth=options.depth,
-        refine_triangles=options.refine_triangles,
-        refine_gap=options.refine_gap,
-        certify=options.certify,
-    )
+    given = {key: getattr(options, name) for name, key in BAKE_SETTINGS.items() if getattr(options, name) is not None}
+    file = read_settings(options.settings) if options.settings else SettingsFile({}, {})
+    settings = Settings(**(file.settings | given))
+    # The reader of the model is told, too.
+    options.doors = settings.doors if settings.doors == "closed" else options.doors
     out = Path(options.out) if options.out else default_out(model)
     before = _stamp(out)
     made = compute(
@@ -94,6 +88,7 @@ def bake(options: argparse.Namespace) -> int:
         device=options.device,
         overwrite=options.overwrite,
         progress=_progress(options),
+        tuned=file.tuned,
     )
     say(summary(made))
     # A bake that is written anew is a new folder.
@@ -204,6 +199,37 @@ def check(options: argparse.Namespace) -> int:
         write_check(result, options.out)
         say(f"written to {options.out}")
     return 0 if result.ok else FAILED
+
+
+def tune_lod(options: argparse.Namespace) -> int:
+    """Try ways to choose levels of detail, print what came of it and write it down."""
+    from ..data.camera import Screen
+    from ..data.database import load
+
+    screen = Screen(*options.resolution, options.fov)
+    _start_warp()
+    made = load(options.bake)
+    from ..solvers.benefit import BenefitSettings
+    from .tune_lod import default_out, write_tuning
+    from .tune_lod import tune_lod as tune
+
+    benefit = BenefitSettings(always=tuple(options.always))
+    result = tune(
+        made,
+        frames=options.frames,
+        budgets_ms=options.budget_ms,
+        screen=screen,
+        path=options.path,
+        samples=options.samples,
+        benefit=benefit,
+        seed=options.seed,
+        progress=_progress(options),
+    )
+    say(result.text())
+    asked = {"frames": options.frames, "path": options.path, "samples": options.samples, "seed": options.seed}
+    file = write_tuning(result, made, options.out or default_out(made), screen=screen, benefit=benefit, asked=asked)
+    say(f"written to {file.parent}; bake MODEL --settings {file} bakes with it")
+    return 0
 
 
 def report(options: argparse.Namespace) -> int:
