@@ -10,9 +10,9 @@ An eye counts only outside every solid where the occluders are sections of solid
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from .shadow import USABLE, Umbras, launch_shrink, launch_umbra
 
 CLUSTERS = (1, 6, 14, 26)
 OBJECTIVES = ("centre", "random", "socp", "lp")
+# From programmes (solvers/projection_point.py) to points.
+PointChooser = Callable[[list], np.ndarray]
 # View cells whose projection points are solved for together.
 BLOCK = 16
 
@@ -135,6 +137,7 @@ def vlod_hidden(
     settings: VlodSettings,
     *,
     objects: int | None = None,
+    points: PointChooser | None = None,
     threads: int = 1,
     device: str = "cpu",
 ) -> tuple[np.ndarray, VlodStats]:
@@ -147,6 +150,8 @@ def vlod_hidden(
         owners: object of each part, shape (p,), int.
         settings: of the method.
         objects: how many there are; by default one more than the last owner.
+        points: chooses projection points instead of `settings.objective`, to compare solvers: from the clusters'
+            programmes to points, shape (clusters, 3); any point in front of all occluders of its cluster is safe.
         threads: CPU threads.
         device: Warp device.
 
@@ -164,7 +169,7 @@ def vlod_hidden(
         raise InputError(f"cells, parts, owners: expected shapes (m, 2, 3), (p, 2, 3), (p,), found {found}")
     if len(owners) and not 0 <= owners.min() <= owners.max() < objects:
         raise InputError(f"owners: expected objects 0 to {objects - 1}, found {owners.min()} to {owners.max()}")
-    method = _Method(occluders, parts.astype(np.int32), settings, VlodStats(), threads, device)
+    method = _Method(occluders, parts.astype(np.int32), settings, VlodStats(), threads, device, points)
     hidden = np.ones((len(cells), objects), bool)
     split = [split_cell(cell, settings.split) for cell in cells]
     block = max(1, BLOCK // settings.split**3)
@@ -210,6 +215,42 @@ def shrunk_occluders(
     return method.shrink(view, None)
 
 
+def culling_scores(
+    cell: np.ndarray, occluders: Patches, parts: np.ndarray, weights: np.ndarray, settings: VlodSettings
+) -> list[Callable[[np.ndarray], float]]:
+    """For each cluster of a view cell: weight of the parts that its occluders hide, as a function of the point.
+
+    This is what projection points are chosen for and what their programmes stand in for; a step function.
+
+    Args:
+        cell: one view cell [grid steps], shape (2, 3), int32.
+        occluders: as of `vlod_hidden`.
+        parts: as of `vlod_hidden`.
+        weights: of the parts, such as their triangles, shape (p,).
+        settings: of the method; the objective plays no part.
+    """
+    method = _Method(
+        occluders, np.asarray(parts, np.int32), replace(settings, objective="centre"), VlodStats(), 1, "cpu"
+    )
+    view = method.prepare(np.asarray(cell)[None])[0]
+    everything = np.arange(len(parts))
+
+    def score_of(cluster: int) -> Callable[[np.ndarray], float]:
+        rows = np.flatnonzero(view.cluster == cluster)
+        points = view.points.copy()
+
+        def score(point: np.ndarray) -> float:
+            if not len(rows):
+                return 0.0
+            points[cluster] = point
+            part = _View(view.cell, view.umbras, view.rows[rows], view.cluster[rows], points)
+            return float(weights[method.hidden(part, everything)].sum())
+
+        return score
+
+    return [score_of(cluster) for cluster in range(settings.clusters)]
+
+
 def split_cell(cell: np.ndarray, count: int) -> np.ndarray:
     """Boxes that tile a view cell, `count` on each axis, fewer where it is thinner [grid steps], shape (n, 2, 3)."""
     borders = [np.unique(np.linspace(cell[0, axis], cell[1, axis], count + 1).astype(np.int64)) for axis in range(3)]
@@ -239,6 +280,7 @@ class _Method:
     stats: VlodStats
     threads: int
     device: str
+    choose: PointChooser | None = None
 
     def prepare(self, cells: np.ndarray) -> list[_View]:
         """Umbras and projection points of some view cells."""
@@ -287,9 +329,9 @@ class _Method:
     def _points(self, cells: np.ndarray, umbras: Umbras, cell_of: np.ndarray, cluster: np.ndarray) -> np.ndarray:
         """Projection point of each cluster of each view cell, shape (cells, clusters, 3)."""
         shape = (len(cells), self.settings.clusters, 3)
-        if self.settings.objective == "centre":
+        if self.choose is None and self.settings.objective == "centre":
             return np.broadcast_to(cells.mean(axis=1)[:, None], shape)
-        if self.settings.objective == "random":
+        if self.choose is None and self.settings.objective == "random":
             # A cell's points depend on nothing but the cell and the seed.
             seeds = [[self.settings.seed, *(cell.astype(np.int64) + GRID_LIMIT).ravel()] for cell in cells]
             share = np.stack([np.random.default_rng(seed).random(shape[1:]) for seed in seeds])
@@ -299,8 +341,12 @@ class _Method:
         from ..solvers.result import Status
 
         size = self.parts.max(axis=(0, 1), initial=1).astype(float) - self.parts.min(axis=(0, 1), initial=0)
-        only = {"objective": self.settings.objective, "depth": float(np.linalg.norm(size))}
-        result = solve_points(cluster_problems(umbras, cells, cell_of, cluster, self.settings.clusters, **only))
+        objective = "lp" if self.settings.objective == "lp" else "socp"
+        only = {"objective": objective, "depth": float(np.linalg.norm(size))}
+        problems = cluster_problems(umbras, cells, cell_of, cluster, self.settings.clusters, **only)
+        if self.choose is not None:
+            return self.choose(problems).reshape(shape)
+        result = solve_points(problems)
         self.stats.fallbacks += int(np.isin(result.status, (Status.REJECTED, Status.INFEASIBLE)).sum())
         return result.point.reshape(shape)
 

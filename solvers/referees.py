@@ -11,6 +11,9 @@ import numpy as np
 from .projection_point import Problem, in_front
 from .result import Result, Status
 
+# Rows that an answer violates by more [cell diagonals] cannot all be satisfied, or the solver failed.
+INFEASIBLE = 1e-6
+
 
 def cone_point(problem: Problem) -> Result:
     """The quadratic programme as a second-order cone programme, by Clarabel (interior point, conic).
@@ -48,6 +51,69 @@ def cone_point(problem: Problem) -> Result:
     gap = abs(solution.obj_val - solution.obj_val_dual) / (1 + abs(solution.obj_val))
     residuals = (solution.r_prim, solution.r_dual, gap)
     return _single(problem, point, solved, solution.iterations, residuals, begin)
+
+
+def gradient_point(problem: Problem, *, tolerance: float = 1e-12) -> Result:
+    """Either programme by sequential quadratic programming with gradients (NLopt, SLSQP), from the centre.
+
+    Infeasible problems are told by the rows that the answer violates: the library itself may report success.
+
+    Args:
+        problem: with at least one occluder.
+        tolerance: on the step, relative, at which it stops.
+    """
+    import nlopt
+
+    begin = time.perf_counter()
+    hessian, gradient, bounds = problem.scaled()
+    search = nlopt.opt(nlopt.LD_SLSQP, 3)
+    last = np.zeros(3)
+
+    def value(step: np.ndarray, slope: np.ndarray) -> float:
+        last[:] = step
+        if slope.size:
+            slope[:] = hessian @ step + gradient
+        return float(step @ (hessian @ step) / 2 + gradient @ step)
+
+    def short(out: np.ndarray, step: np.ndarray, slope: np.ndarray) -> None:
+        if slope.size:
+            slope[:] = -problem.rows
+        out[:] = bounds - problem.rows @ step
+
+    search.set_min_objective(value)
+    search.add_inequality_mconstraint(short, np.zeros(len(bounds)))
+    search.set_xtol_rel(tolerance)
+    search.set_maxeval(500)
+    try:
+        step, stopped = search.optimize(np.zeros(3)), search.last_optimize_result()
+    except nlopt.RoundoffLimited:
+        # No step reduces the objective any more: it ends where it stands.
+        step, stopped = last, nlopt.XTOL_REACHED
+    except RuntimeError:
+        step, stopped = np.zeros(3), nlopt.FAILURE
+    violation = float(np.maximum(bounds - problem.rows @ step, 0).max())
+    point = problem.centre + problem.scale * step
+    return _single(
+        problem,
+        point,
+        stopped > 0 and stopped != nlopt.MAXEVAL_REACHED,
+        search.get_numevals(),
+        (violation, 0.0, 0.0),
+        begin,
+    )
+
+
+def feasible_point(problem: Problem, *, seed: int = 0) -> Result:
+    """A random point that no row forbids: on a chord through the centre, which is inside."""
+    begin = time.perf_counter()
+    _, _, bounds = problem.scaled()
+    random = np.random.default_rng(seed)
+    direction = random.normal(size=3)
+    slope, slack = problem.rows @ direction, -bounds
+    ends = np.where(slope < 0, slack / np.where(slope < 0, -slope, 1.0), np.inf)
+    reach = max(0.0, float(ends.min()))
+    point = problem.centre + problem.scale * random.random() * reach * direction
+    return _single(problem, point, bool((slack >= 0).all()), 1, (0.0, 0.0, 0.0), begin)
 
 
 def vertex_point(problem: Problem) -> Result:
@@ -135,7 +201,9 @@ def _single(
     """Result of one problem, the point replaced by the centre where it may not be used."""
     objective = problem.objective(point)
     status = Status.SOLVED if solved else Status.LIMIT
-    if not in_front(problem, point):
+    if (problem.bounds - problem.rows @ point).max(initial=0.0) > INFEASIBLE * problem.scale:
+        point, status = problem.centre, Status.INFEASIBLE
+    elif not in_front(problem, point):
         point, status = problem.centre, Status.REJECTED
     return _result(point, objective, status, iterations, residuals, begin)
 

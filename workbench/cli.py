@@ -197,6 +197,19 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
     bake.add_argument(
         "--certify", action="store_true", help="store a certificate of all that is hidden, and hide nothing else"
     )
+    bake.add_argument("--split", action="store_true", help="make connected components objects of their own")
+    bake.add_argument(
+        "--lods", action="store_true", help="simplify shapes that have one level, and say which level does from where"
+    )
+    bake.add_argument(
+        "--pixels", type=_number, default=1.0, metavar="N", help="a level may deviate by on the image; 1 by default"
+    )
+    bake.add_argument(
+        "--resolution", type=_resolution, default=(1920, 1080), metavar="WxH", help="of that image; 1920x1080 by default"
+    )
+    bake.add_argument(
+        "--fov", type=_number, default=60.0, metavar="DEG", help="its vertical field of view; 60 by default"
+    )
     bake.add_argument("--up", choices=["y", "z"], help="axis that points up in a mesh file")
     bake.add_argument("--unit", help="unit of a mesh file, a name or metres; metre by default")
     bake.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")
@@ -290,7 +303,19 @@ def _numbers(text: str) -> list[float]:
 def _add_tune(commands: argparse._SubParsersAction) -> None:
     tune = commands.add_parser("tune", help="try settings on your own model", description="Try settings on a model.")
     solvers = tune.add_subparsers(title="solvers", metavar="SOLVER", required=True)
+    _add_tune_points(solvers)
     _add_tune_lod(solvers)
+
+
+def _add_tune_points(solvers: argparse._SubParsersAction) -> None:
+    points = _command(
+        solvers, "projection-point", "tune_points", "Try ways to choose projection points on view cells of a bake."
+    )
+    points.add_argument("bake", metavar="BAKE", help="bake folder of a model")
+    points.add_argument("--cells", type=_whole(1), default=8, help="view cells to try them on; 8 by default")
+    points.add_argument("--out", metavar="FOLDER", help="folder to write; BAKE's name with .tune by default")
+    points.add_argument("--no-progress", action="store_true", help="no progress bar")
+    _seed(points, "the view cells and random points")
 
 
 def _add_tune_lod(solvers: argparse._SubParsersAction) -> None:

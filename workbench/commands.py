@@ -201,6 +201,21 @@ def check(options: argparse.Namespace) -> int:
     return 0 if result.ok else FAILED
 
 
+def tune_points(options: argparse.Namespace) -> int:
+    """Try ways to choose projection points, print what came of it and write it down."""
+    from ..data.database import load
+    from .tune_points import point_lines, tune_projection_point
+
+    _start_warp()
+    found = tune_projection_point(
+        load(options.bake), cells=options.cells, seed=options.seed, out=options.out, progress=_progress(options)
+    )
+    say(point_lines(found))
+    if found.wrong_hidden:
+        print(f"viewcell: {found.wrong_hidden} pairs hidden although seen; this is a bug", file=sys.stderr)
+    return FAILED if found.wrong_hidden else 0
+
+
 def tune_lod(options: argparse.Namespace) -> int:
     """Try ways to choose levels of detail, print what came of it and write it down."""
     from ..data.camera import Screen
