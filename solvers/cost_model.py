@@ -20,6 +20,8 @@ from ..data.view_cells import read_rows
 COLUMNS = ("primitives", "pixels", "seconds")
 # Four unknowns: fewer rows would fit anything.
 LEAST_ROWS = 12
+# Times that grow by less than this part of an empty frame's do not tell what drawing costs.
+LEAST_GROWTH = 1.0e-3
 # Costs are raised until this share of the samples took no longer than modelled.
 COVERED = 0.99
 
@@ -137,9 +139,9 @@ def fit_cost_model(
     scale = np.linalg.norm(relative, axis=0)
     scale[scale == 0] = 1.0
     found = nnls(relative / scale, np.ones(count))[0] / scale
-    if not found[:3].any():
-        raise InputError("samples: expected seconds that grow with primitives, pixels or objects, found none that do")
     modelled = np.stack(terms, axis=1) @ found
+    if (modelled - found[3]).max() < LEAST_GROWTH * found[3]:
+        raise InputError("samples: expected seconds that grow with primitives, pixels or objects, found none that do")
     off = modelled / measured - 1
     spread = ((measured - measured.mean()) ** 2).sum()
     return CostModel(

@@ -53,9 +53,13 @@ def read_settings(path: str | Path) -> SettingsFile:
     for name, value in found.items():
         if name not in defaults:
             raise InputError(f"{path}: expected keys among {', '.join(defaults)}; found {name!r}")
-        kind = type(defaults[name])
-        # JSON writes 4.0 as 4; true is no number.
-        fits = type(value) in (int, float) if kind is float else type(value) is kind
-        if not fits:
-            raise InputError(f"{path}: expected {name} to be {kind.__name__}, found {value!r}")
+        if not _fits(value, defaults[name]):
+            raise InputError(f"{path}: expected {name} to be like {json.dumps(defaults[name])}, found {value!r}")
     return SettingsFile({name: type(defaults[name])(value) for name, value in found.items()}, tuned)
+
+
+def _fits(value: object, default: object) -> bool:
+    """Whether JSON's value is of the default's type: 4.0 may be written 4, and true is no number."""
+    if isinstance(default, tuple):
+        return isinstance(value, list) and len(value) == len(default) and all(map(_fits, value, default))
+    return type(value) in (int, float) if isinstance(default, float) else type(value) is type(default)

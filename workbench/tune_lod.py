@@ -42,8 +42,9 @@ from .software_renderer import SAMPLE_FRAMES, SoftwareRenderer, fit_renderer, me
 from .summary import table
 
 FRAMES = 300
-# Budgets unless given: parts of what the 95th percentile of the frames costs at its finest.
-SHARES = (0.35, 0.5, 0.7)
+# Budgets unless given: parts of the work in the 95th percentile of the frames at its finest, beside an empty frame.
+SHARES = (0.3, 0.5, 0.7)
+ROUNDING = 1.0e-9
 COHERENCE = Coherence(hysteresis=0.1, slack=0.02)
 # HiGHS solves and the software renderer draws the same frames.
 DRAWN_FRAMES = 20
@@ -128,6 +129,11 @@ class Outcome:
     dropped: int
 
 
+def _percent(share: float) -> str:
+    """A loss in percent; below the bound's own rounding it is none."""
+    return f"{100 * share:.3g}" if share > ROUNDING else "0"
+
+
 @dataclass
 class Tuning:
     """What was tried and what came of it.
@@ -161,7 +167,7 @@ class Tuning:
         rows = []
         for o in self.outcomes:
             measured = "-" if o.measured_misses is None else f"{100 * o.measured_misses:.0f}"
-            marks = ("yes" if o.coherent else "no", f"{100 * o.lost_mean:.3g}", f"{100 * o.lost_most:.3g}")
+            marks = ("yes" if o.coherent else "no", _percent(o.lost_mean), _percent(o.lost_most))
             rest = (f"{100 * o.kept_detail:.1f}", f"{o.switches:.2f}", f"{100 * o.modelled_misses:.1f}", measured)
             rows.append((f"{o.budget_ms:.3g}", o.method, *marks, *rest, f"{o.choose_ms:.2f}"))
         return head, rows
@@ -296,8 +302,8 @@ def _try_all(
     whole_ms = empty_ms + np.bincount(owner, dearest, len(frames)) / 1e6
     most = np.bincount(owner, finest, len(frames))
     if budgets_ms is None:
-        budgets_ms = [float(f"{np.percentile(whole_ms, 95) * share:.2g}") for share in SHARES]
-        budgets_ms = [budget for budget in budgets_ms if budget > empty_ms] or [float(np.ceil(2 * empty_ms))]
+        most_ms = np.percentile(whole_ms, 95) - empty_ms
+        budgets_ms = [float(f"{empty_ms + most_ms * share:.3g}") for share in SHARES]
     budgets_ms = sorted(set(map(float, budgets_ms)))
     tried, modelled = [], {"all finest": whole_ms}
     for budget_ms in budgets_ms:
@@ -390,11 +396,11 @@ def recommend(outcomes: Sequence[Outcome]) -> tuple[str, bool, str]:
     limit = max(SWITCHES_MOST, SWITCHES_FACTOR * min(mean("switch_share", s) for s in punctual))
     calm = [s for s in punctual if mean("switch_share", s) <= limit]
     best = min(calm, key=lambda s: (round(mean("lost_mean", s), 6), mean("choose_ms", s)))
-    plain = mean("switches", (best[0], False))
+    plain = mean("switches", (best[0], False) if (best[0], False) in settings else best)
     reason = (
         f"recommended: {best[0]}, {'with' if best[1] else 'without'} coherence. Of all that change few levels it loses "
-        f"least: {100 * mean('lost_mean', best):.3g} % of the certified bound on average, "
-        f"{100 * most('lost_most', best):.3g} % at worst; {mean('switches', best):.2f} levels change a frame "
+        f"least: {_percent(mean('lost_mean', best))} % of the certified bound on average, "
+        f"{_percent(most('lost_most', best))} % at worst; {mean('switches', best):.2f} levels change a frame "
         f"({plain:.2f} without coherence); {100 * most('modelled_misses', best):.1f} % of the frames miss their "
         f"modelled time; {mean('choose_ms', best):.2f} ms to choose (rule: {RULE})"
     )
