@@ -25,6 +25,7 @@ from .verdict import Verdict
 WITNESS = ("origin_x", "origin_y", "origin_z", "direction_x", "direction_y", "direction_z")
 CELL_TO_CELL = ("cell_id", "reached_cell_id", "verdict", "portals", *WITNESS)
 CELL_TO_OBJECT = ("cell_id", "object_id", "verdict", *WITNESS)
+CELL_LODS = ("cell_id", "object_id", "lod")
 
 
 @dataclass
@@ -104,6 +105,17 @@ class Bake:
     def cell_to_object(self) -> pa.Table:
         """Reached objects: verdict and witness [m]."""
         return read_table(self.folder / "cell_to_object.parquet", CELL_TO_OBJECT)
+
+    @cached_property
+    def cell_lods(self) -> pa.Table:
+        """Levels of detail above 0 that potentially visible objects may be drawn at from anywhere in a cell.
+
+        What has no row is drawn at level 0; in a bake without levels of detail that is everything.
+        """
+        path = self.folder / "cell_lods.parquet"
+        if not path.exists():
+            return pa.table({name: pa.array([], pa.int32()) for name in CELL_LODS})
+        return read_table(path, CELL_LODS)
 
     @cached_property
     def potential_cells(self) -> np.ndarray:

@@ -141,9 +141,8 @@ def nearest(tree: TriangleTree, p: wp.vec3d, guess: int) -> wp.vec2d:
 @wp.func
 def piece_square(tree: TriangleTree, item: int, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> wp.float64:
     """Squared distance from a triangle of the tree within which the whole piece abc is."""
-    return wp.max(
-        wp.max(triangle_square(tree, item, a), triangle_square(tree, item, b)), triangle_square(tree, item, c)
-    )
+    ends = wp.max(triangle_square(tree, item, a), triangle_square(tree, item, b))
+    return wp.max(ends, triangle_square(tree, item, c))
 
 
 @wp.func

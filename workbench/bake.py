@@ -20,6 +20,7 @@ from ..data.errors import InputError
 from ..data.graph import CellGraph
 from ..data.graph_folder import read_graph
 from ..data.inhabit import find_inhabitable
+from ..data.lod import object_errors, split_components
 from ..data.opaque import OpaquePlanes, opaque_planes
 from ..data.portals import find_portals
 from ..data.scene import GRID_LIMIT, GRID_M, Role, Scene
@@ -27,6 +28,7 @@ from ..data.scene_folder import replaceable, scene_manifest
 from ..data.solids import closed_elements, dead_cells
 from ..data.subdivide import cut_rooms, merge, subdivide
 from ..data.view_cells import as_graph, octants, octree_roots, read_view_cells, walkable
+from ..kernels.pixel_error import PixelLimit, pixel_levels
 
 if TYPE_CHECKING:
     from ..kernels.engine import Engine, Part, ViewCellEngine
@@ -65,6 +67,11 @@ class Settings:
         clusters: of occluders by direction, for "vlod"; see `viewcell.kernels.vlod.VlodSettings`.
         objective: of projection points, for "vlod".
         resolution: of cube maps, for "vlod".
+        split: connected components become objects of their own.
+        lods: simplify definitions that have a single level, and store which levels do from where.
+        pixels: a level may deviate on the image by no more.
+        image: width x height of the image that `pixels` are counted on.
+        fov_deg: its vertical field of view.
     """
 
     threshold_m2: float = 0.0
@@ -81,6 +88,19 @@ class Settings:
     clusters: int = 26
     objective: str = "socp"
     resolution: int = 512
+    split: bool = False
+    lods: bool = False
+    pixels: float = 1.0
+    image: str = "1920x1080"
+    fov_deg: float = 60.0
+
+    @property
+    def pixel_limit(self) -> PixelLimit:
+        """What levels are chosen for; raises InputError for a number out of range."""
+        width, _, height = self.image.partition("x")
+        if not (width.isdecimal() and height.isdecimal()):
+            raise InputError(f"resolution: expected WIDTHxHEIGHT in pixels, found {self.image!r}")
+        return PixelLimit(self.pixels, (int(width), int(height)), self.fov_deg)
 
 
 @dataclass
@@ -139,7 +159,13 @@ def bake(
     print_ = _fingerprint(scene, graph_folder, settings)
     if not overwrite and (done := _finished(out, print_)) is not None:
         return _with_tuned(done, tuned or {})
+    notes = {}
+    if settings.split or settings.lods:
+        if scene is None:
+            raise InputError(f"{graph_folder}: expected a model to split or to simplify, found a bare graph")
+        scene, notes = _detailed(scene, settings, clock, threads, device, progress)
     prepared = _prepare(scene, graph_folder, settings, clock)
+    prepared.facts |= notes
     graph, facts = prepared.graph, prepared.facts
     if not graph.inhabitable.any():
         raise InputError(f"{facts['source']}: expected at least one inhabitable cell, found none")
@@ -152,6 +178,10 @@ def bake(
         facts["counts"] = facts["counts"] | _triangle_counts(scene, graph, object_rows, threads, device)
         clock.lap("back faces")
 
+    if scene is not None and settings.lods:
+        certificates = certificates | {"cell_lods": _cell_lods(scene, graph, object_rows, settings)}
+        clock.lap("levels of detail")
+
     def manifest() -> dict:
         return _manifest(facts, settings, print_, graph, cell_rows, object_rows, clock)
 
@@ -159,6 +189,35 @@ def bake(
     if not spent:
         shutil.rmtree(_partial(out), ignore_errors=True)
     return made
+
+
+def _detailed(
+    scene: Scene, settings: Settings, clock: Clock, threads: int | None, device: str, progress: bool
+) -> tuple[Scene, dict]:
+    """The model with components as objects and chains of levels, as far as asked, and what the manifest says of it."""
+    clock.lap("read")
+    notes = {}
+    if settings.split:
+        scene = split_components(scene)
+    if settings.lods:
+        from ..solvers.lod_chain import with_lods
+
+        scene, notes["lod_notes"] = with_lods(scene, threads=threads, device=device, progress=progress)
+    clock.lap("levels of detail")
+    return scene, notes
+
+
+def _cell_lods(scene: Scene, graph: CellGraph, rows: VisibleRows, settings: Settings) -> pa.Table:
+    """Rows of cell_lods.parquet: levels coarser than 0 that do from everywhere in a cell."""
+    errors, starts = object_errors(scene)
+    # Objects are drawn unsnapped, up to half a step beyond their snapped boxes.
+    bounds = (scene.object_bounds() + np.array([[-0.5], [0.5]])) * scene.grid_m
+    pairs = np.column_stack([rows.source, rows.target])
+    levels = pixel_levels(graph.cells * scene.grid_m, bounds, errors, starts, pairs, settings.pixel_limit)
+    coarser = levels > 0
+    names = ("cell_id", "object_id", "lod")
+    columns = rows.source[coarser], rows.target[coarser], levels[coarser]
+    return pa.table({name: pa.array(x, pa.int32()) for name, x in zip(names, columns, strict=True)})
 
 
 @dataclass
@@ -261,6 +320,7 @@ def _check(settings: Settings, budget_s: float | None, threads: int | None, devi
             raise InputError(f"{name}: expected a number {'above 0' if least else 'from 0'}, found {value}")
     if settings.seal > 0:
         raise InputError(f"seal: expected 0 (closing cracks is not built yet), found {settings.seal}")
+    _ = settings.pixel_limit
     if settings.method not in METHODS:
         raise InputError(f"method: expected {', '.join(METHODS)}, found {settings.method!r}")
     if not 0 <= settings.depth <= DEEPEST:

@@ -27,6 +27,11 @@ BAKE_SETTINGS = {
     "refine_triangles": "refine_triangles",
     "refine_gap": "refine_gap",
     "certify": "certify",
+    "split": "split",
+    "lods": "lods",
+    "pixels": "pixels",
+    "resolution": "image",
+    "fov": "fov_deg",
 }
 
 
@@ -130,6 +135,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_check(commands)
     _add_tune(commands)
     _add_report(commands)
+    _add_export(commands)
     return parser
 
 
@@ -202,14 +208,10 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
         "--lods", action="store_true", help="simplify shapes that have one level, and say which level does from where"
     )
     bake.add_argument(
-        "--pixels", type=_number, default=1.0, metavar="N", help="a level may deviate by on the image; 1 by default"
+        "--pixels", type=_number, metavar="N", help="by how much a level may deviate on the image; 1 by default"
     )
-    bake.add_argument(
-        "--resolution", type=_resolution, default=(1920, 1080), metavar="WxH", help="of that image; 1920x1080 by default"
-    )
-    bake.add_argument(
-        "--fov", type=_number, default=60.0, metavar="DEG", help="its vertical field of view; 60 by default"
-    )
+    bake.add_argument("--resolution", metavar="WxH", help="of that image; 1920x1080 by default")
+    bake.add_argument("--fov", type=_number, metavar="DEG", help="its vertical field of view; 60 by default")
     bake.add_argument("--up", choices=["y", "z"], help="axis that points up in a mesh file")
     bake.add_argument("--unit", help="unit of a mesh file, a name or metres; metre by default")
     bake.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")
@@ -351,6 +353,14 @@ def _add_report(commands: argparse._SubParsersAction) -> None:
     report.add_argument("bake", metavar="BAKE", help="bake folder")
     report.add_argument("--cells", type=_cells, metavar="ID,ID", help="cells to show; three telling ones by default")
     report.add_argument("--out", metavar="FOLDER", help="folder to write; BAKE/report by default")
+
+
+def _add_export(commands: argparse._SubParsersAction) -> None:
+    export = _command(commands, "export", "export", "Write a bake's cells and portals for other tools.")
+    export.add_argument("bake", metavar="BAKE", help="bake folder with portals")
+    export.add_argument(
+        "--prt", metavar="FILE", required=True, help="portal file PRT1 for a Quake-family vis, cells as leaves in order"
+    )
 
 
 if __name__ == "__main__":
