@@ -6,6 +6,7 @@ Nothing heavy is imported before it is needed: an argument that is wrong is refu
 import argparse
 import os
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -276,3 +277,23 @@ def _start_warp() -> None:
 def _progress(options: argparse.Namespace) -> bool:
     """Whether to show a bar: only to somebody who watches."""
     return not options.no_progress and sys.stderr.isatty()
+
+
+def export(options: argparse.Namespace) -> int:
+    """Write cells and portals as a portal file and say how to judge what another tool makes of them."""
+    from ..data.database import load
+    from ..data.quake import UNIT_STEPS, write_prt
+
+    made, out = load(options.bake), Path(options.prt)
+    if not made.graph.portal_count:
+        raise InputError(f"{made.folder}: expected a bake with portals, found none between its cells")
+    try:
+        with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as scratch:
+            write_prt(made.graph, Path(scratch) / "map.prt")
+            os.replace(Path(scratch) / "map.prt", out)
+    except OSError as error:
+        raise InputError(f"{out}: expected a file to write, found {error.strerror}") from None
+    unit = f"1 unit = {UNIT_STEPS * made.grid_m:g} m"
+    say(f"{made.graph.cell_count:,} leaves, {made.graph.portal_count:,} portals, {unit}; written to {out}")
+    say(f"viewcell check {out} --pvs SETS judges the sets that another tool computes for it")
+    return 0
