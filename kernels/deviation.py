@@ -262,7 +262,7 @@ def launch_deviation(
     b: np.ndarray,
     *,
     relative: float = 0.01,
-    absolute: float = 2.0**-12,
+    absolute: float = 2.0**-15,
     threads: int = 1,
     device: str = "cpu",
 ) -> Deviation:

@@ -11,7 +11,7 @@ from viewcell.kernels import deviation
 from viewcell.kernels.deviation import launch_deviation
 from viewcell.verify.deviation_exact import deviation_squared, squared_distance
 
-RELATIVE, ABSOLUTE = 0.01, 2.0**-12
+RELATIVE, ABSOLUTE = 0.01, 2.0**-15
 SQUARE = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], float)
 coordinates = st.integers(-8, 8)
 triangles = st.lists(st.tuples(*[st.tuples(*[coordinates] * 3)] * 3), min_size=1, max_size=4)
