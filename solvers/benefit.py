@@ -47,8 +47,6 @@ class BenefitSettings:
         base_error: of `accuracy_by_samples`.
         edge_focus: focus factor at the corner of the screen, in [0, 1]; 1 turns it off.
         motion: weight of apparent speed, >= 0; 0 turns it off.
-        hysteresis: benefit lost by the largest change of level, in [0, 1); 0 turns it off. It bounds what hysteresis
-            may cost: see `hysteresis_factor`.
         importance: factor by kind, such as IfcDoor; 1 by default.
         algorithms: rendering algorithms to choose from.
         always: kinds that are drawn in any case: they have no level "nothing".
@@ -58,7 +56,6 @@ class BenefitSettings:
     base_error: float = 0.5
     edge_focus: float = 0.5
     motion: float = 1.0
-    hysteresis: float = 0.1
     importance: Mapping[str, float] = field(default_factory=dict)
     algorithms: Sequence[Algorithm] = (Algorithm("flat"),)
     always: Sequence[str] = ()
@@ -69,8 +66,6 @@ class BenefitSettings:
         for name, least, most in (("base_error", 0, 1), ("edge_focus", 0, 1), ("motion", 0, np.inf)):
             if not least <= getattr(self, name) <= most:
                 raise InputError(f"{name}: expected a number from {least} to {most}, found {getattr(self, name)}")
-        if not 0 <= self.hysteresis < 1:
-            raise InputError(f"hysteresis: expected a number from 0, below 1; found {self.hysteresis}")
         for kind, factor in self.importance.items():
             if not (np.isfinite(factor) and factor >= 0):
                 raise InputError(f"importance of {kind}: expected a finite number from 0, found {factor}")

@@ -25,11 +25,13 @@ def test_finds_the_coefficients_of_a_linear_renderer():
 
 def test_residuals_are_those_of_the_samples():
     samples = drawn(200, seed=1, noise=0.2)
+    # One frame took far longer than the others tell.
+    samples["seconds"][7] *= 2
     found = fit_cost_model(**samples, renderer="noisy")
     modelled = found.seconds(samples["primitives"], samples["pixels"], samples["objects"])
     off = modelled / samples["seconds"] - 1
     assert found.relative_rms == pytest.approx(np.sqrt((off**2).mean()))
-    assert found.worst == pytest.approx(np.abs(off).max())
+    assert found.worst == pytest.approx(-off.min()) and found.worst > off.max()
     spread = ((samples["seconds"] - samples["seconds"].mean()) ** 2).sum()
     assert found.r2 == pytest.approx(1 - ((modelled - samples["seconds"]) ** 2).sum() / spread)
     assert 0.05 < found.relative_rms < 0.2

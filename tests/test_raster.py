@@ -70,9 +70,9 @@ def test_pixels_show_what_exact_rays_meet_first(seed, device):
 def test_triangles_that_share_an_edge_leave_no_pixel_between_them():
     rng = np.random.default_rng(1)
     screen = Screen(101, 77, 60.0)
-    for _ in range(20):
-        # A square before the eye, cut along lines through pixel centres and others.
-        middle = np.append(rng.integers(-300, 300, 2), 2048)
+    for middle in [(0, 0), *rng.integers(-300, 300, (20, 2)).tolist()]:
+        # A square before the eye, cut along lines through pixel centres first, then along others.
+        middle = np.append(middle, 2048)
         rim = np.array([[-4096, -4096], [4096, -4096], [4096, 4096], [-4096, 4096]])
         corners = np.column_stack([rim, np.full(4, 2048)])
         fan = np.array([[middle, corners[k], corners[(k + 1) % 4]] for k in range(4)])
@@ -158,6 +158,27 @@ def test_no_box_with_a_pixel_on_the_screen_is_called_outside(seed):
             assert inside[k]
             x, y = columns + 0.5 - screen.width / 2, screen.height / 2 - rows - 0.5
             assert (cut[k, 0] <= [x.min(), y.min()]).all() and (cut[k, 1] >= [x.max(), y.max()]).all()
+
+
+def test_rectangles_are_those_of_the_boxes_edges_beyond_the_near_plane():
+    rng, screen = np.random.default_rng(0), Screen(64, 48, 65.0)
+    eyes, axes = random_view(3)
+    middles, t = rng.uniform(-2, 2, (40, 3)), np.linspace(0, 1, 20_001)[:, None]
+    boxes = np.stack([middles - rng.uniform(0.01, 2, (40, 3)), middles + rng.uniform(0.01, 2, (40, 3))], axis=1)
+    rectangles = project_boxes(screen, np.repeat(eyes / 1024, 40, 0), np.repeat(axes, 40, 0), boxes)
+    half = np.array([screen.width, screen.height]) / 2
+    crossing = 0
+    for box, rectangle in zip(boxes, rectangles, strict=True):
+        corners = (np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(8, 3) - eyes[0] / 1024) @ axes[0].T
+        pairs = [(a, b) for a in range(8) for b in range(a) if bin(a ^ b).count("1") == 1]
+        points = np.concatenate([corners[a] + t * (corners[b] - corners[a]) for a, b in pairs])
+        beyond = points[:, 2] >= NEAR_M
+        crossing += 0 < beyond.sum() < len(points)
+        if beyond.any():
+            shown = screen.focal * points[beyond, :2] / points[beyond, 2:]
+            expected = np.clip([shown.min(axis=0), shown.max(axis=0)], -half, half)
+            assert np.abs(np.clip(rectangle, -half, half) - expected).max() < 0.5
+    assert crossing > 10
 
 
 def test_refuses_what_it_cannot_draw():
