@@ -149,6 +149,14 @@ def test_more_pixels_or_fewer_of_them_allow_more(pixels, width, height, fov):
     assert ratio >= PixelLimit(pixels, (width * 2, height), fov).deviation_per_distance
 
 
+def test_objects_have_levels_of_their_own():
+    errors = np.array([0.0, 0.0, 1e-6, 0.0, 1e-6, 2e-6, 3e-6])
+    found = pixel_levels(
+        CELL, np.repeat(OBJECT, 3, axis=0), errors, np.array([0, 1, 3, 7]), np.array([[0, 0], [0, 1], [0, 2]]), LIMIT
+    )
+    assert found.tolist() == [0, 1, 3]
+
+
 def test_pairs_in_chunks(monkeypatch):
     rng = np.random.default_rng(0)
     cells, bounds = (np.cumsum(rng.random((n, 2, 3)) * 9, axis=1) for n in (7, 11))
@@ -181,5 +189,6 @@ def test_bad_limits(change, said):
 def test_bad_rows():
     with pytest.raises(InputError, match="rows"):
         pixel_levels(CELL, OBJECT, np.zeros(1), np.array([0, 1]), np.array([[0, 1]]), LIMIT)
-    with pytest.raises(InputError, match="starts"):
-        pixel_levels(CELL, OBJECT, np.zeros(1), np.array([0, 2]), np.array([[0, 0]]), LIMIT)
+    for starts in ([0, 2], [0, 1, 1], [0, 0, 1], [0]):
+        with pytest.raises(InputError, match="starts"):
+            pixel_levels(CELL, OBJECT, np.zeros(1), np.array(starts), np.array([[0, 0]]), LIMIT)
