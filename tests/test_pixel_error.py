@@ -192,3 +192,5 @@ def test_bad_rows():
     for starts in ([0, 2], [0, 1, 1], [0, 0, 1], [0]):
         with pytest.raises(InputError, match="starts"):
             pixel_levels(CELL, OBJECT, np.zeros(1), np.array(starts), np.array([[0, 0]]), LIMIT)
+    with pytest.raises(InputError, match="starts"):
+        pixel_levels(CELL, OBJECT, np.zeros(2), np.array([0, 1, 2]), np.array([[0, 0]]), LIMIT)
