@@ -115,6 +115,8 @@ def test_tunes_an_office(office, tmp_path, capsys):
         if o.method in ("kernel", HIGHS) and not o.coherent:
             best = min(p.lost_mean for p in outcomes if p.budget_ms == o.budget_ms)
             assert o.lost_mean <= best + 0.05
+    # The tightest frame time cannot hold all that would fit in a fraction.
+    assert max(o.lost_mean for o in outcomes) > 1e-4
     page = (out / "tune-lod.html").read_text()
     picture = base64.b64decode(re.search(r'src="data:image/png;base64,([^"]+)"', page)[1])
     assert picture == (out / "tune-lod.png").read_bytes() and picture.startswith(b"\x89PNG")
@@ -125,7 +127,9 @@ def test_tunes_an_office(office, tmp_path, capsys):
 
 
 def test_coherence_changes_fewer_levels_and_loses_no_more_than_its_slack(office):
-    result = tune_lod(load(office / "office.bake"), frames=40, samples=None, screen=tuning.Screen(64, 48))
+    result = tune_lod(load(office / "office.bake"), frames=40, screen=tuning.Screen(64, 48))
+    # HiGHS has solved a frame here and there: nothing can be said of flicker.
+    assert {o.method for o in result.outcomes if o.switches is None} == {HIGHS}
     for budget in result.budgets_ms:
         plain, coherent = (
             next(o for o in result.outcomes if (o.method, o.coherent, o.budget_ms) == ("kernel", how, budget))
@@ -151,6 +155,7 @@ def test_a_users_samples_and_path_are_used(office, tmp_path, capsys):
     assert found["lod"]["budgets_ms"] == [0.2, 0.3]
     assert found["lod"]["cost"]["primitive_s"] == pytest.approx(1e-8, rel=1e-6)
     assert all(row["measured_misses"] is None for row in found["outcomes"])
+    assert all(row["switches"] is not None for row in found["outcomes"])
     assert not (tmp_path / "out" / "samples.csv").exists()
     # The samples are the same whenever they are read: so is everything but the time to choose.
     assert main([*asked[:6], *asked[6:8], "--out", str(tmp_path / "again"), *given, "--always", "IfcWall,IfcSlab"]) == 0
@@ -223,8 +228,7 @@ def test_settings_come_from_the_file_unless_given(graph, tmp_path):
         ('{"certify": 1}', "expected certify to be like false, found 1"),
         ('{"tuned": "lod", "settings": [], "lod": {}}', "expected an object as settings"),
         ('{"tuned": "lod", "settings": {}, "lod": 3}', "expected an object as lod"),
-        ('{"image": [9, 9.5]}', "expected image to be like [1920, 1080]"),
-        ('{"image": [9]}', "expected image to be like [1920, 1080]"),
+        ('{"image": [9, 9]}', 'expected image to be like "1920x1080", found [9, 9]'),
         ("[1]", "expected a JSON object"),
         ("{", "expected JSON"),
     ],

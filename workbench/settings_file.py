@@ -60,6 +60,4 @@ def read_settings(path: str | Path) -> SettingsFile:
 
 def _fits(value: object, default: object) -> bool:
     """Whether JSON's value is of the default's type: 4.0 may be written 4, and true is no number."""
-    if isinstance(default, tuple):
-        return isinstance(value, list) and len(value) == len(default) and all(map(_fits, value, default))
     return type(value) in (int, float) if isinstance(default, float) else type(value) is type(default)

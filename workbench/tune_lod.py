@@ -106,8 +106,8 @@ class Outcome:
         lost_mean: mean of 1 - value / certified bound: what the best choice could have more is no more than that.
         lost_most: the largest.
         kept_detail: value over that of all finest levels, over all frames.
-        switches: objects a frame that change level.
-        switch_share: of the objects shown.
+        switches: objects a frame that change level; None where the frames do not follow one another.
+        switch_share: of the objects shown; likewise.
         modelled_misses: share of frames whose modelled time is above the budget.
         measured_misses: likewise of those drawn by the software renderer; None if the costs are not its own.
         choose_ms: median time to choose a frame's levels.
@@ -121,8 +121,8 @@ class Outcome:
     lost_mean: float
     lost_most: float
     kept_detail: float
-    switches: float
-    switch_share: float
+    switches: float | None
+    switch_share: float | None
     modelled_misses: float
     measured_misses: float | None
     choose_ms: float
@@ -167,8 +167,9 @@ class Tuning:
         rows = []
         for o in self.outcomes:
             measured = "-" if o.measured_misses is None else f"{100 * o.measured_misses:.0f}"
+            switches = "-" if o.switches is None else f"{o.switches:.2f}"
             marks = ("yes" if o.coherent else "no", _percent(o.lost_mean), _percent(o.lost_most))
-            rest = (f"{100 * o.kept_detail:.1f}", f"{o.switches:.2f}", f"{100 * o.modelled_misses:.1f}", measured)
+            rest = (f"{100 * o.kept_detail:.1f}", switches, f"{100 * o.modelled_misses:.1f}", measured)
             rows.append((f"{o.budget_ms:.3g}", o.method, *marks, *rest, f"{o.choose_ms:.2f}"))
         return head, rows
 
@@ -315,7 +316,7 @@ def _try_all(
                 found = select_frames(sightings, candidates, costs, budget, choose, how, some, step)
                 tried.append((method, how, budget_ms, found, bounds[some]))
                 if method == KERNEL and how == coherence and budget_ms == budgets_ms[len(budgets_ms) // 2]:
-                    modelled[f"chosen for {budget_ms:.3g} ms"] = empty_ms + found.cost / 1e6
+                    modelled[f"{KERNEL} with coherence, for {budget_ms:.3g} ms"] = empty_ms + found.cost / 1e6
     over = [None] * len(tried) if renderer is None else _drawn_misses(problem, renderer, tried)
     outcomes = [_outcome(*one, most, misses, empty_ms) for one, misses in zip(tried, over, strict=True)]
     best, coherent, reason = recommend(outcomes)
@@ -362,6 +363,7 @@ def _outcome(
     empty_ms: float,
 ) -> Outcome:
     lost = np.divide(bounds - found.value, bounds, out=np.zeros(len(bounds)), where=bounds > 0)
+    follow = len(found.frames) == len(most)
     return Outcome(
         method=method,
         coherent=how != Coherence(),
@@ -370,8 +372,8 @@ def _outcome(
         lost_mean=float(lost.mean()),
         lost_most=float(lost.max()),
         kept_detail=float(found.value.sum() / most[found.frames].sum()) if most[found.frames].any() else 1.0,
-        switches=float(found.switches.mean()),
-        switch_share=float(found.switches.sum() / max(1, found.shown.sum())),
+        switches=float(found.switches.mean()) if follow else None,
+        switch_share=float(found.switches.sum() / max(1, found.shown.sum())) if follow else None,
         modelled_misses=float((empty_ms + found.cost / 1e6 > budget_ms * (1 + 1e-12)).mean()),
         measured_misses=misses,
         choose_ms=float(np.median(found.seconds) * 1e3),
