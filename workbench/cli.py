@@ -135,6 +135,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_check(commands)
     _add_tune(commands)
     _add_report(commands)
+    _add_curves(commands)
     _add_export(commands)
     return parser
 
@@ -353,6 +354,19 @@ def _add_report(commands: argparse._SubParsersAction) -> None:
     report.add_argument("bake", metavar="BAKE", help="bake folder")
     report.add_argument("--cells", type=_cells, metavar="ID,ID", help="cells to show; three telling ones by default")
     report.add_argument("--out", metavar="FOLDER", help="folder to write; BAKE/report by default")
+
+
+def _add_curves(commands: argparse._SubParsersAction) -> None:
+    curves = _command(commands, "curves", "curves", "Sweep every method's knob over a bake: time against error.")
+    curves.add_argument("bake", metavar="BAKE", help="bake folder")
+    curves.add_argument("--cells", type=_whole(1), default=8, help="view cells to sweep over; 8 by default")
+    curves.add_argument(
+        "--out",
+        metavar="FOLDER",
+        help="folder for curves.json and .png; BAKE/report by default, where report finds them",
+    )
+    curves.add_argument("--no-progress", action="store_true", help="no progress bar")
+    _seed(curves, "the view cells and what the methods draw")
 
 
 def _add_export(commands: argparse._SubParsersAction) -> None:

@@ -279,6 +279,21 @@ def _progress(options: argparse.Namespace) -> bool:
     return not options.no_progress and sys.stderr.isatty()
 
 
+def curves(options: argparse.Namespace) -> int:
+    """Sweep the knobs, draw the curves and say which settings are worth their time."""
+    from ..data.database import load
+    from .curves import curve_lines, sweep, write_curves
+
+    _start_warp()
+    made = load(options.bake)
+    found = sweep(made, cells=options.cells, seed=options.seed, progress=_progress(options))
+    folder = Path(options.out) if options.out else Path(made.folder) / "report"
+    write_curves(found, folder)
+    say(curve_lines(found))
+    say(f"written to {folder}")
+    return FAILED if any(p.wrong_hidden for one in found.safe for p in one.points) else 0
+
+
 def export(options: argparse.Namespace) -> int:
     """Write cells and portals as a portal file and say how to judge what another tool makes of them."""
     from ..data.database import load

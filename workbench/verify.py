@@ -2,6 +2,7 @@
 
 import time
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from ..data.database import Bake
 
 BATCH_RAYS = 100_000
+# Rays of a cell at a time where nothing is judged in between.
+RUN_MOST = 50_000
 # Points to aim at: fewest and most; many rays share one, from different origins.
 AIMS = (1 << 14, 1 << 20)
 # The same in hidden cells beside the potentially visible ones, for each source.
@@ -169,6 +172,31 @@ def _make_caster(
         seed=seed,
     )
     return caster, sources
+
+
+def seen_by_rays(bake: "Bake", rays: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Cells that rays enter and objects that they hit, whatever the bake says of them; no exact test.
+
+    Args:
+        bake: its model, or graph, and cells are used.
+        rays: over all inhabitable cells, even ones and aimed ones as `verify` casts them.
+        seed: of origins and directions.
+
+    Returns:
+        Shapes (cells, cells) and (cells, objects), bool.
+    """
+    everything = copy(bake)
+    for name in ("potential_cells", "potential_objects"):
+        everything.__dict__[name] = np.ones_like(getattr(bake, name))
+    sources = np.flatnonzero(bake.graph.inhabitable)
+    found = tuple(np.zeros_like(getattr(bake, name)) for name in ("potential_cells", "potential_objects"))
+    caster, sources = _make_caster(everything, make_judge(bake), sources, rays, seed, VerifyResult())
+    if caster is not None:
+        each = -(-rays // len(sources))
+        for first in range(0, each, RUN_MOST):
+            caster.cast(first, min(RUN_MOST, each - first))
+        found[0][sources], found[1][sources] = caster.seen_cells > 0, caster.seen_objects > 0
+    return found
 
 
 def _cast_all(bake: "Bake", caster: Caster, judge: Judge, rays: int, progress: bool, result: VerifyResult) -> None:

@@ -27,8 +27,7 @@ from ...kernels.occlusion import Occlusion, seen_objects
 from ...kernels.shaft import launch_shaft
 from ...kernels.vlod import VlodSettings, join_outlines, rectangle_outlines, vlod_hidden
 from ...workbench.bake import Settings, opaque_rectangles
-from ...workbench.verify import _make_caster, make_judge
-from ..findings import VerifyResult
+from ...workbench.verify import seen_by_rays
 from ..witness import visible_rows
 from .timing import commit, print_head, print_row, quiet
 
@@ -176,7 +175,7 @@ def compare(scene: Scene, name: str, count: int, rays: int, only: str) -> None:
         result = verify(made, rays=rays)
         rows = visible_rows(made.cell_to_object)
         seen[rows["cell_id"].to_numpy(), rows["object_id"].to_numpy()] = True
-        seen |= _seen_by_rays(made, rays)
+        seen |= seen_by_rays(made, rays, 1)[1]
     regions, patches = occluders
     found = f"seen {seen[:count].sum():,} / {seen[count:].sum():,}"
     checked = f"{result.rays:,} rays, {result.wrong_hidden} wrong hidden, {result.refuted} refuted"
@@ -206,18 +205,6 @@ def compare(scene: Scene, name: str, count: int, rays: int, only: str) -> None:
             spread = f" ({min(times):,.0f}-{max(times):,.0f})" if len(times) > 1 else ""
             columns += [f"{ratio:.2f}", f"{statistics.median(times):,.0f}{spread}"]
         print_row([*columns, wrong])
-
-
-def _seen_by_rays(made: object, rays: int) -> np.ndarray:
-    """Objects that rays from each cell hit, shape (cells, objects), bool."""
-    made.__dict__["potential_objects"] = np.ones_like(made.potential_objects)
-    caster, sources = _make_caster(made, make_judge(made), np.arange(made.graph.cell_count), rays, 1, VerifyResult())
-    each = -(-rays // len(sources))
-    for first in range(0, each, 50_000):
-        caster.cast(first, min(50_000, each - first))
-    out = np.zeros(made.potential_objects.shape, bool)
-    out[sources] = caster.seen_objects > 0
-    return out
 
 
 def main(arguments: list[str] | None = None) -> int:

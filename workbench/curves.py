@@ -1,0 +1,444 @@
+"""Curves of time against error: every knob of every method swept over some view cells of a bake.
+
+Error is potential / seen, where seen is what any of the runs has a witness for or any ray hits: the true overestimate
+is at most that. Sampling alone is the exception that the picture is for: it is fast and hides what is visible, so its
+ratio falls below 1.
+"""
+
+import io
+import json
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from itertools import chain, pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from tqdm import tqdm
+
+from ..data.errors import InputError
+from ..verify.witness import visible_rows
+from .bake import Settings, bake
+from .summary import table
+from .tune_plots import COLOURS, MARKERS
+from .verify import seen_by_rays
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..data.database import Bake
+
+THRESHOLDS_M2 = (0.0, 1.0, 4.0)
+SPLITS = (1, 2)
+SIDES_M = (0.25, 0.5, 1.0, 2.0, 4.0)
+# Budgets as parts of what the whole bake took; not swept where that was more than so many seconds.
+SHARES = (0.1, 0.2, 0.4, 0.7)
+WHOLE_S = 60.0
+RESOLUTIONS = (64, 128, 256, 512, 1024)
+CLUSTERS = (1, 6, 14, 26)
+RAYS = (1_000, 10_000, 100_000, 1_000_000)
+GRAPH_RAYS = (10, 100, 1_000, 10_000)
+SAMPLING, LEVELS = "sampling alone", "levels of detail"
+# Drawn instead of 0.
+EXACT = 1e-4
+PIXELS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+
+
+@dataclass(frozen=True)
+class Point:
+    """One setting of one knob.
+
+    Attributes:
+        value: of the knob.
+        seconds: of visibility, for all view cells, preparation apart; NaN where time is not what it trades.
+        error: potential / seen; of the knob pixels the share of triangles that is drawn.
+        unknown: share of the potential pairs without a witness, or NaN.
+        wrong_hidden: pairs hidden although seen.
+    """
+
+    value: float
+    seconds: float
+    error: float
+    unknown: float
+    wrong_hidden: int
+
+
+@dataclass(frozen=True)
+class Series:
+    """A method whose knob is swept; see `Point`.
+
+    Attributes:
+        method: in words.
+        knob: with its unit.
+        points: in the order they were run.
+        apart: of other view cells than the rest, and so not to be compared with it point by point.
+    """
+
+    method: str
+    knob: str
+    points: list[Point]
+    apart: bool = False
+
+
+@dataclass(frozen=True)
+class Curves:
+    """All series of a scene.
+
+    Attributes:
+        scene: its name and size.
+        series: of the methods.
+        pairs: seen pairs that errors are relative to.
+    """
+
+    scene: str
+    series: list[Series]
+    pairs: int
+
+    @property
+    def safe(self) -> list[Series]:
+        """Those of methods that hide nothing visible, unless they are broken."""
+        return [one for one in self.series if one.method not in (SAMPLING, LEVELS)]
+
+
+@dataclass
+class _Run:
+    """What one setting came to, before the truth is known; of pairs of its own where `apart`."""
+
+    method: str
+    knob: str
+    value: float
+    seconds: float
+    potential: np.ndarray
+    seen: np.ndarray
+    apart: bool = False
+
+
+def sweep(bake_: "Bake", *, cells: int = 8, seed: int = 0, progress: bool = False) -> Curves:
+    """Sweep the knobs of portals, occluders, both, projection points and sampling over some view cells of a bake.
+
+    Args:
+        bake_: of a model or of a bare graph; of a graph all cells are taken, and only portals and sampling apply.
+        cells: view cells, drawn at random among the inhabitable ones.
+        seed: of the draw and of what the methods draw.
+        progress: show a progress bar.
+
+    Raises:
+        InputError: no inhabitable cell.
+    """
+    sources = np.flatnonzero(bake_.graph.inhabitable)
+    if not len(sources) or cells < 1:
+        raise InputError(f"{bake_.folder}: expected view cells to sweep over, found none")
+    with tempfile.TemporaryDirectory() as name, tqdm(desc="curves", unit="run", disable=not progress) as bar:
+        if bake_.manifest["counts"]["objects"]:
+            chosen = np.sort(np.random.default_rng(seed).permutation(sources)[:cells])
+            sweeper = _Sweeper(bake_, chosen, Path(name), seed)
+            runs, drawn = chain(sweeper.runs(), sweeper.budgets(bake_)), sweeper.pixel_series()
+            size = f"{len(chosen)} view cells, {len(bake_.scene.objects):,} objects"
+        else:
+            runs, drawn = _GraphSweeper(bake_, seed).runs(), None
+            size = f"{len(sources):,} inhabitable of {bake_.graph.cell_count:,} cells"
+        found = []
+        for run in runs:
+            found.append(run)
+            bar.update()
+    truth = np.logical_or.reduce([run.seen for run in found if not run.apart])
+    series: dict[tuple[str, str], Series] = {}
+    for run in found:
+        one = series.setdefault((run.method, run.knob), Series(run.method, run.knob, [], run.apart))
+        one.points.append(_point(run, run.seen if run.apart else truth))
+    every = list(series.values())
+    return Curves(f"{Path(bake_.folder).stem}: {size}", every + ([drawn] if drawn else []), int(truth.sum()))
+
+
+def _point(run: _Run, truth: np.ndarray) -> Point:
+    potential = int(run.potential.sum())
+    unknown = 1 - (run.potential & truth).sum() / max(1, potential)
+    error = potential / max(1, int(truth.sum()))
+    return Point(run.value, run.seconds, float(error), float(unknown), int((truth & ~run.potential).sum()))
+
+
+class _Sweeper:
+    """Sweeps over view cells of a model: each is a bake of a table of these cells."""
+
+    def __init__(self, bake_: "Bake", chosen: np.ndarray, folder: Path, seed: int) -> None:
+        self._scene, self._folder, self._seed, self._count = bake_.scene, folder, seed, 0
+        self._boxes = bake_.graph.cells[chosen].astype(np.int64)
+
+    def runs(self) -> Iterator[_Run]:
+        """One by one."""
+        # The first run compiles.
+        self._bake(self._boxes[:1], Settings(method="both"))
+        for area in THRESHOLDS_M2:
+            yield self._run("portals alone", "cut planes from, m2", area, Settings(method="portals", threshold_m2=area))
+        made = self._bake(self._boxes, Settings(method="occluders"))
+        for parts in SPLITS:
+            yield self._split("occluders alone", parts)
+        middle = (self._boxes[:, 0] + self._boxes[:, 1]) // 2
+        for side in SIDES_M:
+            half = round(side / 2 / self._scene.grid_m)
+            low, high = np.maximum(self._boxes[:, 0], middle - half), np.minimum(self._boxes[:, 1], middle + half)
+            smaller = self._bake(np.stack([low, high], axis=1), Settings(method="occluders"))
+            yield replace(_run(smaller, "occluders alone", "side of smaller cells, m", side), apart=True)
+        yield self._run("both", "no knob", 1.0, Settings(method="both"))
+        for resolution in RESOLUTIONS:
+            settings = Settings(method="vlod", resolution=resolution)
+            yield self._run("projection points", "resolution, pixels", resolution, settings)
+        for clusters in CLUSTERS:
+            yield self._run("projection points", "clusters", clusters, Settings(method="vlod", clusters=clusters))
+        yield from _sampled(made, "rays a cell", RAYS, False, self._seed)
+
+    def budgets(self, whole: "Bake") -> Iterator[_Run]:
+        """All inhabitable cells at once, stopped early."""
+        if _seconds(whole) > WHOLE_S:
+            return
+        boxes = whole.graph.cells[whole.graph.inhabitable].astype(np.int64)
+        made = self._bake(boxes, Settings(method="occluders"))
+        seen, most = _seen(made), _seconds(made)
+        for share in SHARES:
+            early = self._bake(boxes, Settings(method="occluders"), max(share * most, 1e-3))
+            potential = early.potential_objects
+            yield _Run("occluders, all cells", "budget, share", share, _seconds(early), potential, seen, apart=True)
+        yield _Run("occluders, all cells", "budget, share", 1.0, most, made.potential_objects, seen, apart=True)
+
+    def pixel_series(self) -> Series | None:
+        """Share of the triangles that is drawn as the limit on the image's deviation grows."""
+        from ..data.lod import object_errors
+        from ..kernels.pixel_error import PixelLimit, pixel_levels
+
+        scene, points = self._scene, []
+        shapes = [[len(mesh.faces) for mesh in scene.definitions[o.definition_id].lods] for o in scene.objects]
+        if max(len(levels) for levels in shapes) == 1:
+            return None
+        errors, starts = object_errors(scene)
+        counts = np.concatenate([np.array(levels) for levels in shapes])
+        bounds = (scene.object_bounds() + np.array([[-0.5], [0.5]])) * scene.grid_m
+        pairs = np.stack(np.meshgrid(np.arange(len(self._boxes)), np.arange(len(shapes)), indexing="ij"), -1)
+        pairs = pairs.reshape(-1, 2)
+        finest = counts[starts[:-1]][pairs[:, 1]].sum()
+        for pixels in PIXELS:
+            level = pixel_levels(self._boxes * scene.grid_m, bounds, errors, starts, pairs, PixelLimit(pixels))
+            share = counts[starts[:-1][pairs[:, 1]] + level].sum() / finest
+            points.append(Point(pixels, float("nan"), float(share), float("nan"), 0))
+        return Series(LEVELS, "pixels", points)
+
+    def _bake(self, boxes: np.ndarray, settings: Settings, budget_s: float | None = None) -> "Bake":
+        """A bake of view cells [grid steps], in a folder of its own."""
+        self._count += 1
+        table = self._folder / f"{self._count}.csv"
+        scene = self._scene
+        rows = boxes.reshape(-1, 6) * scene.grid_m + np.tile(scene.origin, 2)
+        lines = [",".join(f"{value:.10f}" for value in row) for row in rows]
+        table.write_text("\n".join(["min_x,min_y,min_z,max_x,max_y,max_z", *lines]) + "\n", encoding="utf-8")
+        settings = Settings(**(asdict(settings) | {"cells": str(table), "seed": self._seed}))
+        return bake(scene, self._folder / f"{self._count}.bake", settings=settings, budget_s=budget_s)
+
+    def _run(self, method: str, knob: str, value: float, settings: Settings) -> _Run:
+        return _run(self._bake(self._boxes, settings), method, knob, value)
+
+    def _split(self, method: str, parts: int) -> _Run:
+        """View cells cut in parts on each axis; a cell sees what a part sees."""
+        from ..kernels.vlod import split_cell
+
+        boxes = [split_cell(box, parts) for box in self._boxes]
+        made = self._bake(np.concatenate(boxes), Settings(method="occluders"))
+        ends = np.cumsum([0, *map(len, boxes)])
+        potential, seen = (
+            np.array([rows[a:b].any(axis=0) for a, b in pairwise(ends)])
+            for rows in (made.potential_objects, _seen(made))
+        )
+        return _Run(method, "parts on an axis", parts, _seconds(made), potential, seen)
+
+
+class _GraphSweeper:
+    """Sweeps over all cells of a bare graph, whose portals are decided exactly."""
+
+    def __init__(self, bake_: "Bake", seed: int) -> None:
+        self._bake, self._seed = bake_, seed
+
+    def runs(self) -> Iterator[_Run]:
+        """One by one."""
+        bake_ = self._bake
+        seconds = _seconds(bake_)
+        yield _Run("portals alone", "no knob", 1.0, seconds, bake_.potential_cells, _seen_cells(bake_))
+        yield from _sampled(bake_, "rays a cell", GRAPH_RAYS, True, self._seed)
+
+
+def _run(made: "Bake", method: str, knob: str, value: float) -> _Run:
+    return _Run(method, knob, value, _seconds(made), made.potential_objects, _seen(made))
+
+
+def _seconds(made: "Bake") -> float:
+    """Visibility alone: reading, cutting cells and preparing occluders take as long for one cell as for all."""
+    return made.manifest["seconds"]["flood"]
+
+
+def _sampled(made: "Bake", knob: str, counts: tuple[int, ...], cells: bool, seed: int) -> Iterator[_Run]:
+    """What so many rays from each inhabitable cell show, as if nothing else were there."""
+    stands = made.graph.inhabitable
+    # The first is thrown away: what it takes is preparation.
+    for rays in (1, *counts):
+        begin = time.perf_counter()
+        found = seen_by_rays(made, rays * int(stands.sum()), seed)[0 if cells else 1]
+        seconds = time.perf_counter() - begin
+        if rays == 1:
+            prepared = seconds
+            continue
+        found[~stands] = False
+        yield _Run(SAMPLING, knob, rays, max(seconds - prepared, 1e-3), found, found)
+
+
+def _seen(made: "Bake") -> np.ndarray:
+    """Objects with a witness, shape (cells, objects), bool."""
+    rows, out = visible_rows(made.cell_to_object), np.zeros_like(made.potential_objects)
+    out[rows["cell_id"].to_numpy(), rows["object_id"].to_numpy()] = True
+    return out
+
+
+def _seen_cells(made: "Bake") -> np.ndarray:
+    """Cells with a witness, shape (cells, cells), bool."""
+    rows, out = visible_rows(made.cell_to_cell), np.zeros_like(made.potential_cells)
+    out[rows["cell_id"].to_numpy(), rows["reached_cell_id"].to_numpy()] = True
+    return out
+
+
+def read_curves(path: str | Path) -> Curves:
+    """Curves that `write_curves` has written.
+
+    Raises:
+        InputError: the file is unreadable or holds something else.
+    """
+    try:
+        found = json.loads(Path(path).read_text(encoding="utf-8"))
+        series = [
+            Series(
+                one["method"],
+                one["knob"],
+                [Point(**{name: _number(value) for name, value in point.items()}) for point in one["points"]],
+                bool(one["apart"]),
+            )
+            for one in found["series"]
+        ]
+        return Curves(str(found["scene"]), series, int(found["pairs"]))
+    except OSError as error:
+        raise InputError(f"{path}: expected curves, found {error.strerror}") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: expected curves that report has written, found {type(error).__name__}") from None
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else value
+
+
+def write_curves(curves: Curves, folder: Path) -> None:
+    """Write curves.json and curves.png into a folder, both or none.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".curves.") as scratch:
+            (Path(scratch) / "curves.json").write_text(json.dumps(_content(curves), indent=1) + "\n", encoding="utf-8")
+            (Path(scratch) / "curves.png").write_bytes(curves_plot(curves))
+            for name in ("curves.png", "curves.json"):
+                (Path(scratch) / name).replace(folder / name)
+    except OSError as error:
+        raise InputError(f"{folder}: expected a folder to write to, found {error.strerror}") from None
+
+
+def _content(curves: Curves) -> dict:
+    """What curves.json says."""
+    content = {"scene": curves.scene, "pairs": curves.pairs, "series": [asdict(one) for one in curves.series]}
+    for one in content["series"]:
+        for point in one["points"]:
+            for name in ("seconds", "unknown"):
+                # NaN is no JSON.
+                point[name] = None if np.isnan(point[name]) else point[name]
+    return content
+
+
+def curve_lines(curves: Curves) -> str:
+    """All points for people, those of the Pareto front marked."""
+    front = pareto_points(curves.safe)
+    rows = []
+    for one in curves.series:
+        for point in one.points:
+            error = f"{100 * point.error:.1f} % drawn" if one.method == LEVELS else f"{point.error:.3f}"
+            seconds = "" if np.isnan(point.seconds) else f"{point.seconds:.3f}"
+            name = f"{one.method}, {one.knob}" + (" *" if point in front else "")
+            rows.append((name, f"{point.value:g}", seconds, error, point.wrong_hidden))
+    head = (
+        f"{curves.scene} (* none is both faster and tighter)",
+        "knob",
+        "seconds",
+        "potential / seen",
+        "hidden wrongly",
+    )
+    return table(head, rows)
+
+
+def curves_plot(curves: Curves) -> bytes:
+    """PNG: time against overestimate with the Pareto front, what sampling hides, and triangles against pixels."""
+    from matplotlib.figure import Figure
+
+    safe = curves.safe
+    sampled, drawn = ([one for one in curves.series if one.method == name] for name in (SAMPLING, LEVELS))
+    figure = Figure(figsize=(15 if drawn else 12, 6.2), layout="constrained")
+    figure.suptitle(f"Time against error. {curves.scene}", fontsize=12)
+    panels = figure.subplots(1, 3 if drawn else 2, width_ratios=[2, 1, 1] if drawn else [2, 1])
+    _draw_safe(panels[0], safe)
+    for one in sampled:
+        hidden = [100 * p.wrong_hidden / curves.pairs for p in one.points]
+        panels[1].plot([p.seconds for p in one.points], hidden, "X-", color=COLOURS[3])
+        for p, y in zip(one.points, hidden, strict=True):
+            panels[1].annotate(f"{p.value:,.0f}", (p.seconds, y), (5, 5), textcoords="offset points", fontsize=8)
+    panels[1].set(xscale="log", xlabel="seconds of casting", ylabel="seen pairs that it hides [%]")
+    panels[1].set_title(f"sampling alone is not safe ({sampled[0].knob})", fontsize=10)
+    for one in drawn:
+        panels[2].plot([p.value for p in one.points], [100 * p.error for p in one.points], "o-", color=COLOURS[0])
+        panels[2].set(xscale="log", xlabel="deviation allowed on the image [pixels]", ylabel="triangles drawn [%]")
+        panels[2].set_title("levels of detail, 1920 x 1080", fontsize=10)
+        panels[2].set_ylim(0, None)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=4, fontsize=9, frameon=False)
+    for axes in panels:
+        axes.grid(True, which="major", alpha=0.3)
+    out = io.BytesIO()
+    figure.savefig(out, dpi=110, format="png")
+    return out.getvalue()
+
+
+def _draw_safe(axes: "Axes", series: list[Series]) -> None:
+    """Methods that hide nothing visible: one colour a method, one marker a knob."""
+    methods = list(dict.fromkeys(one.method for one in series))
+    for number, one in enumerate(series):
+        colour, marker = COLOURS[methods.index(one.method)], MARKERS[number % len(MARKERS)]
+        label = one.method if one.knob == "no knob" else f"{one.method}: {one.knob}"
+        points = sorted(one.points, key=lambda p: p.value)
+        xs, ys = [p.seconds for p in points], [_above(p) for p in points]
+        axes.plot(xs, ys, marker=marker, color=colour, linewidth=1, alpha=0.85, label=label)
+        if len(points) > 1:
+            for p in points:
+                axes.annotate(f"{p.value:g}", (p.seconds, _above(p)), (5, 4), textcoords="offset points", fontsize=7)
+    front = pareto_points(series)
+    axes.step(
+        [p.seconds for p in front], [_above(p) for p in front], where="post", color="black", linewidth=2, zorder=0
+    )
+    axes.plot([], [], color="black", linewidth=2, label="Pareto front")
+    axes.set(xscale="log", yscale="log", xlabel="seconds of visibility", ylabel="overestimate: potential / seen - 1")
+    axes.set_title("nothing visible is hidden", fontsize=10)
+
+
+def _above(point: Point) -> float:
+    """Overestimate beyond 1, for a logarithmic axis."""
+    return max(point.error - 1, EXACT)
+
+
+def pareto_points(series: list[Series]) -> list[Point]:
+    """Points that no other one beats in both time and error, fastest first."""
+    front: list[Point] = []
+    for point in sorted((p for one in series if not one.apart for p in one.points), key=lambda p: (p.seconds, p.error)):
+        if not front or point.error < front[-1].error:
+            front.append(point)
+    return front
