@@ -71,7 +71,7 @@ def test_a_method_that_hides_what_is_seen_fails(baked, quick, tmp_path, monkeypa
         return made
 
     monkeypatch.setattr(curves, "bake", hiding)
-    for name in ("THRESHOLDS_M2", "SPLITS", "SIDES_M", "SHARES", "CLUSTERS", "RAYS"):
+    for name in ("THRESHOLDS_M2", "SPLITS", "SIDES_M", "SHARES", "CLUSTERS"):
         monkeypatch.setattr(curves, name, ())
     assert main(["curves", str(baked), "--cells", "1", "--out", str(tmp_path), "--no-progress"]) == 1
 
