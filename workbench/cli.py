@@ -137,6 +137,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_report(commands)
     _add_curves(commands)
     _add_export(commands)
+    _add_bench(commands)
     return parser
 
 
@@ -375,6 +376,25 @@ def _add_export(commands: argparse._SubParsersAction) -> None:
     export.add_argument(
         "--prt", metavar="FILE", required=True, help="portal file PRT1 for a Quake-family vis, cells as leaves in order"
     )
+
+
+def _add_bench(commands: argparse._SubParsersAction) -> None:
+    bench = _command(commands, "bench", "bench", "Time every kernel and solver beside its errors and a baseline.")
+    bench.add_argument(
+        "--suite",
+        choices=["quick", "full"],
+        default="quick",
+        help="quick, the default: a minute or so; full: larger sizes, and how cost grows",
+    )
+    bench.add_argument("--device", default="cpu", help="Warp device, such as cuda:0; cpu by default")
+    bench.add_argument("--json", metavar="FILE", help="where to write the rows")
+    bench.add_argument("--against", metavar="FILE", help="rows of an earlier run: say what got slower or looser")
+    bench.add_argument("--strict", action="store_true", help="fail if anything got slower or looser, or is missing")
+    bench.add_argument(
+        "--only", type=lambda text: text.split(","), default=[], metavar="KERNEL,KERNEL", help="measure these alone"
+    )
+    bench.add_argument("--graphs", metavar="FOLDER", help="flood cells and portals in it, or in folders in it, too")
+    bench.add_argument("--no-progress", action="store_true", help="no progress bar")
 
 
 if __name__ == "__main__":

@@ -259,6 +259,37 @@ def report(options: argparse.Namespace) -> int:
     return 0
 
 
+def bench(options: argparse.Namespace) -> int:
+    """Measure, print the table, write it down and compare it with an earlier run."""
+    _start_warp()
+    from ..verify.bench.against import compare, load_bench
+    from .bench import bench as run
+    from .bench import check_writable, write_bench
+
+    old = load_bench(Path(options.against)) if options.against else None
+    if options.json:
+        check_writable(Path(options.json))
+    result = run(
+        suite=options.suite,
+        device=options.device,
+        only=options.only,
+        graphs=options.graphs,
+        progress=_progress(options),
+    )
+    say(result.text())
+    found, worse = result.json(), False
+    if options.json:
+        write_bench(found, Path(options.json))
+        say(f"written to {options.json}")
+    if old is not None:
+        change = compare(old, found, only=options.only)
+        say(change.text())
+        worse = bool(change.wrong) or (options.strict and bool(change.slower or change.looser or change.missing))
+    if result.wrong_hidden:
+        print(f"viewcell: {result.wrong_hidden} wrongly hidden; this is a bug", file=sys.stderr)
+    return FAILED if worse or result.wrong_hidden else 0
+
+
 def _start_warp() -> None:
     """Start Warp without its greeting, and without its warning that there is no GPU, which no setting silences."""
     import warp
