@@ -44,7 +44,7 @@ def test_report_of_the_house(house, tmp_path):
     assert "| opaque triangles | 216 |" in text and "| flood | 0.10 |" in text
     pictures = [line.partition("](")[2].rstrip(")") for line in text.splitlines() if line.startswith("![")]
     assert len(pictures) == 1 + len(choose_cells(house))
-    assert sorted([*pictures, "report.md"]) == sorted(p.name for p in path.parent.iterdir())
+    assert sorted([*pictures, "report.html", "report.md"]) == sorted(p.name for p in path.parent.iterdir())
 
 
 def test_bare_graph_and_default_folder(tmp_path):
@@ -102,7 +102,7 @@ def test_nothing_inhabitable_gives_a_report_without_pictures(house, tmp_path):
     )
     house.cell_to_object = house.cell_to_object.slice(0, 0)
     path = report(house, out=tmp_path / "r")
-    assert [p.name for p in path.parent.iterdir()] == ["report.md"]
+    assert sorted(p.name for p in path.parent.iterdir()) == ["report.html", "report.md"]
 
 
 def test_chosen_cells_tell_something(house):

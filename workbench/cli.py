@@ -351,10 +351,13 @@ def _add_tune_lod(solvers: argparse._SubParsersAction) -> None:
 
 
 def _add_report(commands: argparse._SubParsersAction) -> None:
-    report = _command(commands, "report", "report", "Write plans, sets and numbers of a bake as Markdown and PNG.")
+    report = _command(commands, "report", "report", "Write plans, sets and numbers of a bake as a page.")
     report.add_argument("bake", metavar="BAKE", help="bake folder")
     report.add_argument("--cells", type=_cells, metavar="ID,ID", help="cells to show; three telling ones by default")
     report.add_argument("--out", metavar="FOLDER", help="folder to write; BAKE/report by default")
+    report.add_argument(
+        "--curves", metavar="FILE", help="curves of time against error to show; FOLDER/curves.json by default"
+    )
 
 
 def _add_curves(commands: argparse._SubParsersAction) -> None:

@@ -255,7 +255,8 @@ def report(options: argparse.Namespace) -> int:
     made = load(options.bake)
     from .report import report as write
 
-    say(str(write(made, cells=options.cells, out=options.out)))
+    text = write(made, cells=options.cells, out=options.out, curves=options.curves)
+    say(f"{text}\n{text.with_suffix('.html')}")
     return 0
 
 

@@ -1,4 +1,4 @@
-"""Look at a bake: plans of its storeys, the sets of chosen cells, and the numbers, as Markdown and PNG."""
+"""Look at a bake: plans of its storeys, sets of cells, and the numbers, as Markdown and PNG and as one HTML page."""
 
 import re
 import shutil
@@ -13,6 +13,7 @@ from ..data.scene import Role
 from ..verify.findings import count_pairs
 from ..verify.plans import Painter, Section, Storey, find_storeys, plan_of
 from ..verify.witness import read_witnesses, visible_rows
+from .report_page import page, read_curves_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,30 +31,41 @@ CALL = re.compile(r"make_(\w+)\((.*)\)")
 COUNTED = ("cells", "inhabitable cells", "portals", "objects", "opaque triangles")
 
 
-def report(bake: "Bake", *, cells: "Sequence[int] | None" = None, out: str | Path | None = None) -> Path:
-    """Write report.md and its pictures.
+def report(
+    bake: "Bake",
+    *,
+    cells: "Sequence[int] | None" = None,
+    out: str | Path | None = None,
+    curves: str | Path | None = None,
+) -> Path:
+    """Write report.md and its pictures, and report.html, which shows every cell and needs no other file.
 
     Args:
         bake: the bake.
         cells: cells whose potentially visible sets are shown; by default three inhabitable ones: the median set, the
             worst overestimate and the largest set.
         out: folder to write, made if need be; by default `report` inside the bake folder.
+        curves: curves of time against error for the page; by default curves.json in that folder, if there is one.
 
     Returns:
         Path of report.md.
 
     Raises:
-        InputError: a cell does not exist or is not inhabitable, or the folder cannot be written.
+        InputError: a cell does not exist or is not inhabitable, the curves are none, or the folder cannot be written.
     """
     chosen = choose_cells(bake) if cells is None else {int(cell): "chosen" for cell in cells}
     for cell in chosen:
         if not (0 <= cell < bake.graph.cell_count and bake.graph.inhabitable[cell]):
             raise InputError(f"cells: expected ids of inhabitable cells, found {cell}")
     folder = Path(out) if out else Path(bake.folder) / "report"
+    if curves is None and (folder / "curves.json").exists():
+        curves = folder / "curves.json"
+    drawn = None if curves is None else read_curves_json(curves)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
             _write(bake, chosen, Path(scratch))
+            (Path(scratch) / "report.html").write_text(page(bake, model_name(bake), drawn), encoding="utf-8")
             for made in sorted(Path(scratch).iterdir()):
                 shutil.move(made, folder / made.name)
     except OSError as error:
