@@ -4,6 +4,7 @@ import numpy as np
 import warp as wp
 
 from ..data.graph import CellGraph
+from .launch import vectors
 
 f64 = wp.float64
 
@@ -34,10 +35,10 @@ def device_graph(graph: CellGraph, device: str = "cpu") -> DeviceGraph:
     negative = (octants[None, :] >> axis[:, None]) & 1
     mask = ((negative == (~forward[:, None]).astype(np.int64)) << octants).sum(axis=1)
     out = DeviceGraph()
-    out.cell_lo = wp.array(graph.cells[:, 0], dtype=wp.vec3i, device=device)
-    out.cell_hi = wp.array(graph.cells[:, 1], dtype=wp.vec3i, device=device)
-    out.portal_lo = wp.array(graph.portals[:, 0], dtype=wp.vec3i, device=device)
-    out.portal_hi = wp.array(graph.portals[:, 1], dtype=wp.vec3i, device=device)
+    out.cell_lo = vectors(graph.cells[:, 0], device)
+    out.cell_hi = vectors(graph.cells[:, 1], device)
+    out.portal_lo = vectors(graph.portals[:, 0], device)
+    out.portal_hi = vectors(graph.portals[:, 1], device)
     out.starts = wp.array(starts, dtype=int, device=device)
     out.entries = wp.array(np.column_stack([pairs, axis, mask]).astype(np.int32), dtype=wp.vec4i, device=device)
     return out

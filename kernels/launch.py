@@ -9,6 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ..data.errors import InputError
+from ..data.scene import GRID_LIMIT
+
 # Items a CPU thread takes at a time: small enough to balance, large enough to hide the launch (about 50 us).
 CHUNK = 1024
 GPU_SLOTS = 8192
@@ -30,8 +33,26 @@ def thread_count(threads: int | None) -> int:
 
 
 def vectors(rows: np.ndarray, device: str) -> wp.array:
-    """Rows of three integers as a Warp array of vec3i."""
+    """Corners in grid steps, three integers each, as a Warp array of vec3i.
+
+    Raises:
+        InputError: a coordinate beyond the grid (data/scene.py), where products of differences stop being exact.
+    """
+    check_coordinates(rows)
+    return triples(rows, device)
+
+
+def triples(rows: np.ndarray, device: str) -> wp.array:
+    """Rows of any three integers, and boxes of a hierarchy, whose empty ones lie beyond the grid, as vec3i."""
     return wp.array(np.ascontiguousarray(rows, np.int32).reshape(-1, 3), dtype=wp.vec3i, device=device)
+
+
+def check_coordinates(values: np.ndarray) -> None:
+    """Refuse coordinates beyond the grid with an InputError."""
+    values = np.asarray(values)
+    most = max(values.max(initial=0), -values.min(initial=0))
+    if not most <= GRID_LIMIT:
+        raise InputError(f"coordinates: expected at most {GRID_LIMIT} grid steps from the origin, found {most}")
 
 
 def run_sliced(

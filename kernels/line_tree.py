@@ -16,7 +16,7 @@ import warp as wp
 
 from ..data import certificates
 from .graph import reflect_high, reflect_low
-from .launch import SlotSizes, run_sliced, vectors
+from .launch import SlotSizes, run_sliced, triples, vectors
 from .stab import (
     AT_M,
     AT_W,
@@ -317,7 +317,7 @@ def _write_part(
     """Words of each row's tree, and all of them; row i may use those up to ends[i]."""
     work = Pairs()
     work.lo, work.hi = vectors(boxes[:, 0], device), vectors(boxes[:, 1], device)
-    work.rows = vectors(rows, device)
+    work.rows = triples(rows, device)
     starts = np.concatenate([[0], ends])
     places = wp.array(starts, dtype=wp.int64, device=device)
     words = wp.empty(int(ends[-1]), dtype=int, device=device)

@@ -21,7 +21,7 @@ import warp as wp
 from ..data.hierarchy import build_hierarchy
 from ..data.patches import Patches
 from ..data.regions import Regions
-from .launch import SlotSizes, run_sliced, vectors
+from .launch import SlotSizes, run_sliced, triples, vectors
 from .sightline import nears, real
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -78,13 +78,13 @@ def device_shields(regions: Regions, patches: Patches, device: str = "cpu") -> S
         setattr(out, name, wp.array(values, dtype=int, device=device))
     out.places = wp.array(regions.places, dtype=wp.int64, device=device)
     nodes = regions.hierarchy
-    out.node_lo, out.node_hi = vectors(nodes.boxes[:, 0], device), vectors(nodes.boxes[:, 1], device)
+    out.node_lo, out.node_hi = triples(nodes.boxes[:, 0], device), triples(nodes.boxes[:, 1], device)
     out.links = wp.array(nodes.links, dtype=wp.vec2i, device=device)
     out.corners = vectors(patches.corners, device)
     out.normal = wp.array(patches.normal, dtype=wp.vec3d, device=device)
     out.depth = wp.array(patches.depth, dtype=wp.vec2d, device=device)
     nodes = build_hierarchy(patches.boxes)
-    out.patch_lo, out.patch_hi = vectors(nodes.boxes[:, 0], device), vectors(nodes.boxes[:, 1], device)
+    out.patch_lo, out.patch_hi = triples(nodes.boxes[:, 0], device), triples(nodes.boxes[:, 1], device)
     out.patch_links = wp.array(nodes.links, dtype=wp.vec2i, device=device)
     return out
 

@@ -13,7 +13,7 @@ import numpy as np
 import warp as wp
 
 from ..data.hierarchy import build_hierarchy
-from .launch import SlotSizes, run_sliced, vectors
+from .launch import SlotSizes, check_coordinates, run_sliced, triples, vectors
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -53,7 +53,7 @@ def device_triangles(triangles: np.ndarray, owners: np.ndarray, device: str = "c
     out = Triangles()
     out.a, out.b, out.c = (vectors(triangles[:, i], device) for i in range(3))
     out.owner = wp.array(owners, dtype=int, device=device)
-    out.node_lo, out.node_hi = vectors(nodes.boxes[:, 0], device), vectors(nodes.boxes[:, 1], device)
+    out.node_lo, out.node_hi = triples(nodes.boxes[:, 0], device), triples(nodes.boxes[:, 1], device)
     out.links = wp.array(nodes.links, dtype=wp.vec2i, device=device)
     return out
 
@@ -344,8 +344,13 @@ def launch_confirm(
 
     Returns:
         Shape (n,), bool. True is never wrong; False may be clear by less than rounding.
+
+    Raises:
+        InputError: a coordinate beyond the grid.
     """
     count = len(origins)
+    check_coordinates(origins)
+    check_coordinates(ends)
     starts = wp.array(np.ascontiguousarray(origins, np.float64), dtype=wp.vec3d, device=device)
     stops = wp.array(np.ascontiguousarray(ends, np.float64), dtype=wp.vec3d, device=device)
     owner = wp.array(np.ascontiguousarray(owners, np.int32), dtype=int, device=device)

@@ -18,7 +18,7 @@ import warp as wp
 
 from ..data.blockers import Blockers
 from .graph import reflect_high, reflect_low
-from .launch import SlotSizes, run_sliced, vectors
+from .launch import SlotSizes, run_sliced, triples, vectors
 from .stab import (
     AT_M,
     AT_W,
@@ -541,7 +541,7 @@ def blocker_tree(blockers: Blockers, device: str = "cpu") -> BlockerTree:
     tree.lo, tree.hi = vectors(blockers.boxes[:, 0], device), vectors(blockers.boxes[:, 1], device)
     tree.axis = wp.array(blockers.axis, dtype=int, device=device)
     nodes = blockers.hierarchy
-    tree.node_lo, tree.node_hi = vectors(nodes.boxes[:, 0], device), vectors(nodes.boxes[:, 1], device)
+    tree.node_lo, tree.node_hi = triples(nodes.boxes[:, 0], device), triples(nodes.boxes[:, 1], device)
     tree.links = wp.array(nodes.links, dtype=wp.vec2i, device=device)
     return tree
 
@@ -568,7 +568,7 @@ def launch_target_search(
     count = len(rows)
     work = Pairs()
     work.lo, work.hi = vectors(boxes[:, 0], device), vectors(boxes[:, 1], device)
-    work.rows = vectors(rows, device)
+    work.rows = triples(rows, device)
     answers = Answers()
     answers.verdict = wp.zeros(count, dtype=wp.uint8, device=device)
     answers.nodes = wp.zeros(count, dtype=int, device=device)

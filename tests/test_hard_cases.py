@@ -254,6 +254,8 @@ BROKEN = {
     "launch_coverage": ("launch_coverage", FullMaps),
     "launch_occludees": ("launch_occludees", np.ones_like),
     "launch_backface": ("launch_backface", lambda found: (found[0] + 1, found[1])),
+    "launch_deviation": ("launch_deviation", lambda found: replace(found, upper=found.upper / 2)),
+    "launch_raster": ("launch_raster", lambda images: replace(images, ids=images.ids + 1)),
     "launch_select": ("launch_select", lambda found: replace(found, bound=found.bound / 2)),
     "vlod_hidden": ("vlod_hidden", lambda found: (np.ones_like(found[0]), found[1])),
     "solve_points": ("launch_occludees", np.ones_like),

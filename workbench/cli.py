@@ -362,7 +362,13 @@ def _add_report(commands: argparse._SubParsersAction) -> None:
 
 def _add_curves(commands: argparse._SubParsersAction) -> None:
     curves = _command(commands, "curves", "curves", "Sweep every method's knob over a bake: time against error.")
-    curves.add_argument("bake", metavar="BAKE", help="bake folder")
+    curves.add_argument("bake", metavar="BAKE", nargs="?", help="bake folder; not with --stability")
+    curves.add_argument(
+        "--stability",
+        action="store_true",
+        help="instead, every kernel's error far from the origin, at slits, with thin occluders and close to edges",
+    )
+    curves.add_argument("--device", default="cpu", help="of --stability, such as cuda:0; cpu by default")
     curves.add_argument("--cells", type=_whole(1), default=8, help="view cells to sweep over; 8 by default")
     curves.add_argument(
         "--out",

@@ -316,7 +316,11 @@ def curves(options: argparse.Namespace) -> int:
     from ..data.database import load
     from .curves import curve_lines, sweep, write_curves
 
+    if options.stability == (options.bake is not None):
+        raise InputError("curves: expected a bake folder or --stability, found both or neither")
     _start_warp()
+    if options.stability:
+        return _stability(options)
     made = load(options.bake)
     found = sweep(made, cells=options.cells, seed=options.seed, progress=_progress(options))
     folder = Path(options.out) if options.out else Path(made.folder) / "report"
@@ -324,6 +328,18 @@ def curves(options: argparse.Namespace) -> int:
     say(curve_lines(found))
     say(f"written to {folder}")
     return FAILED if any(p.wrong_hidden for one in found.safe for p in one.points) else 0
+
+
+def _stability(options: argparse.Namespace) -> int:
+    """Error of the kernels as numbers get hard."""
+    from .stability import FLOAT32, measure_stability, stability_table, write_stability
+
+    rows = measure_stability(seed=options.seed, device=options.device, progress=_progress(options))
+    folder = Path(options.out or "stability")
+    write_stability(rows, folder)
+    say(stability_table(rows))
+    say(f"written to {folder}")
+    return FAILED if any(row.wrong for row in rows if row.kernel != FLOAT32) else 0
 
 
 def export(options: argparse.Namespace) -> int:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data.blockers import Blockers
+from ..data.camera import CameraPath, Screen
 from ..data.graph import CellGraph
 from ..data.hierarchy import build_hierarchy
 from ..data.patches import Patches, find_patches
@@ -19,10 +20,13 @@ from ..data.readers import read
 from ..data.scene import GRID_LIMIT, Definition, Instance, Mesh, Role, Scene
 from ..kernels.backface import build_cones, launch_backface
 from ..kernels.coverage import CubeMaps, launch_coverage
+from ..kernels.deviation import launch_deviation
 from ..kernels.engine import Engine, find_occluders
 from ..kernels.flood import launch_flood
 from ..kernels.line_tree import launch_line_trees
 from ..kernels.occludee import launch_occludees
+from ..kernels.raster import device_triangles as raster_triangles
+from ..kernels.raster import launch_raster
 from ..kernels.select import launch_select
 from ..kernels.shadow import Umbras, launch_grow_hole, launch_shrink, launch_umbra
 from ..kernels.shaft import device_shields, launch_shaft
@@ -31,6 +35,7 @@ from ..kernels.stab_batch import launch_stab
 from ..kernels.target import BlockerTree, blocker_tree, launch_target_search
 from ..kernels.vlod import VlodSettings, join_outlines, vlod_hidden
 from ..kernels.walk import launch_walk
+from ..verify.deviation_exact import deviation_squared
 from ..verify.exact import cross, dot, minus
 from ..verify.hard_cases import (
     GraphCase,
@@ -43,6 +48,7 @@ from ..verify.hard_cases import (
 )
 from ..verify.line_certificate import Blocker
 from ..verify.line_certificate import hides as line_tree_hides
+from ..verify.raster_exact import first_hit
 from ..verify.shadow_exact import box_corners, grown_hole, occluder, rational
 from .bake import Settings, bake, opaque_rectangles
 
@@ -53,6 +59,10 @@ if TYPE_CHECKING:
 CAP = 4000
 # Pixels on the side of the cube maps that cases about regions are drawn into.
 RESOLUTION = 64
+# Quarterings of a triangle in rationals, and how near the bounds on a deviation should be to each other.
+PIECES, TIGHT = 1, 0.02
+# What a pixel shows is left to rounding where its centre is so near to an edge (squared), or two surfaces to another.
+SURE = 1e-12
 # Cell, target, and that the target is a surface.
 TO_SURFACE = np.array([[0, 1, 1]])
 # Names by which the mesh reader tells the roles.
@@ -219,8 +229,10 @@ def _walk(cases: HardCases, device: str) -> Outcomes:
 def _confirm(cases: HardCases, device: str) -> Outcomes:
     for case in cases.sightline:
         triangles = np.array(case.triangles, np.int32)
-        scene = device_triangles(triangles, np.arange(len(triangles)), device)
         ends = np.array(case.segment)[:, None]
+        if max(np.abs(ends).max(), np.abs(triangles).max()) > GRID_LIMIT:
+            continue
+        scene = device_triangles(triangles, np.arange(len(triangles)), device)
         clear = launch_confirm(scene, *ends, np.array([case.excepted]), device=device)[0]
         yield case.name, _clearance(bool(clear), case.expected)
 
@@ -517,6 +529,49 @@ def _select(cases: HardCases, device: str) -> Outcomes:
             yield case.name, Outcome.WRONG
 
 
+def _deviation(cases: HardCases, device: str) -> Outcomes:
+    """From the occluders' surface to the target's and back: the bounds must not miss what rationals say."""
+    for case in (c for c in cases.region if len(c.occluders) == 1):
+        sides = [_triangles(shapes) for shapes in (case.occluders, [case.target])]
+        found = launch_deviation(*sides, device=device)
+        exact = [[tuple(tuple(Fraction(int(c)) for c in p) for p in t) for t in side.tolist()] for side in sides]
+        outcomes = []
+        for way, (a, b) in enumerate((exact, exact[::-1])):
+            least, most = deviation_squared(a, b, PIECES)
+            lower, upper = (Fraction(float(bound[way])) for bound in (found.lower, found.upper))
+            if upper**2 < least or lower**2 > most:
+                outcomes.append(Outcome.WRONG)
+            else:
+                outcomes.append(Outcome.RIGHT if upper <= lower * (1 + TIGHT) + 1 else Outcome.WITHHELD)
+        yield case.name, _worst(outcomes)
+
+
+def _raster(cases: HardCases, device: str) -> Outcomes:
+    """A small picture from the cell's middle towards the target's: what rationals tell surely must be shown."""
+    screen = Screen(2, 2, 60.0)
+    for case in cases.region:
+        shapes = [*case.occluders, case.target]
+        triangles = [_triangles([shape]) for shape in shapes]
+        owners = np.repeat(np.arange(len(shapes)), [len(part) for part in triangles])
+        corners = np.concatenate(triangles).astype(np.int32)
+        eye, goal = (np.array(box, float).mean(axis=0) for box in (case.cell, case.target))
+        way = goal - eye
+        yaw, pitch = np.degrees([np.arctan2(way[1], way[0]), np.arctan2(way[2], np.hypot(way[0], way[1]))])
+        axes = CameraPath(eye[None], np.array([yaw]), np.array([pitch]), np.zeros(1)).axes()
+        calls = np.column_stack([np.arange(len(owners)), np.arange(len(owners)) + 1, owners])
+        size = {"width": screen.width, "height": screen.height, "focal": screen.focal, "near": 1.0}
+        scene = raster_triangles(corners, device)
+        shown = launch_raster(scene, calls, np.array([0, len(calls)]), eye[None], axes, device=device, **size).ids[0]
+        outcomes = []
+        for row, column in np.ndindex(screen.height, screen.width):
+            pixel = (column + 0.5 - screen.width / 2, screen.height / 2 - row - 0.5)
+            hit = first_hit(corners, owners, eye, axes[0], pixel, screen.focal, 1.0)
+            sure = (hit.clear is None or hit.clear > SURE) and (hit.lead is None or hit.lead > SURE)
+            same = int(shown[row, column]) == hit.owner
+            outcomes.append(Outcome.RIGHT if same else Outcome.WRONG if sure else Outcome.WITHHELD)
+        yield case.name, _worst(outcomes)
+
+
 KERNELS: dict[str, Callable[[HardCases, str], Outcomes]] = {
     "launch_stab": _stab,
     "launch_flood": _flood,
@@ -533,6 +588,8 @@ KERNELS: dict[str, Callable[[HardCases, str], Outcomes]] = {
     "launch_occludees": _occludees,
     "launch_backface": _backface,
     "launch_select": _select,
+    "launch_deviation": _deviation,
+    "launch_raster": _raster,
     "vlod_hidden": _vlod,
     "solve_points": _solve_points,
     "bake portals": _bake("portals"),
