@@ -23,7 +23,7 @@ RUNS = 3
 CELLS = (36, 108, 324, 1_080, 3_600)
 # Floors and rooms on each side of the corridor.
 OFFICES = ((1, 1), (1, 4), (2, 6), (4, 10), (8, 16))
-PAIRS = 300
+PAIRS = 3_000
 VIEW_CELLS = 4
 OBJECTS = (1_000, 3_162, 10_000, 31_623, 100_000)
 
@@ -105,7 +105,7 @@ def shaft_growth(device: str, advance: Callable[[], None]) -> list[Growth]:
         ms.append(median_ms(work, device))
         counts["occluders"].append(len(regions.boxes) + len(patches.area))
         advance()
-    return grown("shaft", f"offices, {PAIRS} pairs", counts, ms)
+    return grown("shaft", f"offices, {PAIRS:,} pairs", counts, ms)
 
 
 def occluding_planes(scene: Scene) -> OpaquePlanes:

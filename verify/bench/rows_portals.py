@@ -1,5 +1,6 @@
 """Cases of the portal engine: stabbing, the search of cells, the target search."""
 
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -20,14 +21,11 @@ from .stab import margin_by_scipy, sequences
 from .suite import Case, Errors
 
 BOXES, JUDGED_LISTS, LP_LISTS = 8, 200, 20
-# Rooms of 4 m by 4 m by 3 m, doors of 0.5 m to 2 m, in grid steps.
+# Rooms of 4 m by 4 m by 3 m [grid steps].
 ROOM = np.array([4096, 4096, 3072])
-DOOR = (512, 2048)
-# Share of the walls with a door, and of the slabs with a void.
-OPEN = (0.6, 0.6, 0.2)
-# Stabbing decisions a source and octant of the plain search.
+# Stabbing decisions a source and octant of the plain search: in halls it stops there, without all answers.
 PLAIN_CAP = 200_000
-JUDGED_SOURCES, PLAIN_SOURCES = 2, 200
+JUDGED_SOURCES, PLAIN_SOURCES, PLAIN_OPEN_SOURCES = 2, 200, 4
 # Portal sequences of the exact search from one source: some seconds.
 STEPS = 2_000
 OCTANTS = tuple(product((1, -1), repeat=3))
@@ -71,8 +69,30 @@ def verdict_errors(hidden: np.ndarray, visible: np.ndarray, truth: np.ndarray) -
     )
 
 
-def random_rooms(cells: int, seed: int) -> CellGraph:
+@dataclass(frozen=True)
+class Plan:
+    """Openings of random rooms.
+
+    Attributes:
+        share: of the walls with a door, on either axis, and of the slabs with a void.
+        sides: least and most of an opening's sides [grid steps].
+    """
+
+    share: tuple[float, float, float]
+    sides: tuple[int, int]
+
+
+ROOMS = Plan((0.6, 0.6, 0.2), (512, 2048))
+OPEN_PLAN = Plan((0.9, 0.9, 0.1), (2000, 3000))
+
+
+def random_rooms(cells: int, seed: int, plan: Plan = ROOMS) -> CellGraph:
     """Rooms on a lattice of three storeys or fewer, joined by random doors and voids; every cell inhabitable.
+
+    Args:
+        cells: about how many.
+        seed: of the openings.
+        plan: how many openings, and how large.
 
     Returns:
         A graph of about `cells` cells.
@@ -85,12 +105,12 @@ def random_rooms(cells: int, seed: int) -> CellGraph:
     boxes = np.stack([place, place + 1], axis=1) * ROOM
     pairs, axes, portals = [], [], []
     for axis in range(3):
-        for low in np.flatnonzero((place[:, axis] + 1 < shape[axis]) & (random.random(len(place)) < OPEN[axis])):
+        for low in np.flatnonzero((place[:, axis] + 1 < shape[axis]) & (random.random(len(place)) < plan.share[axis])):
             beyond = place[low] + np.eye(3, dtype=int)[axis]
             portal = boxes[low].copy()
             portal[0, axis] = portal[1, axis]
             for other in OTHER_AXES[axis]:
-                side = random.integers(*DOOR)
+                side = random.integers(*plan.sides)
                 portal[0, other] += random.integers(0, ROOM[other] - side)
                 portal[1, other] = portal[0, other] + side
             pairs.append((low, np.ravel_multi_index(beyond, shape)))
@@ -150,8 +170,11 @@ def spread(count: int, cells: int) -> np.ndarray:
 
 
 def flood_cases(n: int, device: str) -> list[Case]:
-    """All cells from all cells of random rooms."""
-    return [flood_case(random_rooms(n, seed=n), "rooms", device)]
+    """All cells from all cells of random rooms, and of rooms with openings nearly as large as their walls."""
+    return [
+        flood_case(random_rooms(n, seed=n), "rooms", device),
+        flood_case(random_rooms(n, seed=n, plan=OPEN_PLAN), "open plan", device, PLAIN_OPEN_SOURCES),
+    ]
 
 
 def graph_cases(folder: Path, device: str) -> list[Case]:
@@ -167,11 +190,11 @@ def graph_cases(folder: Path, device: str) -> list[Case]:
     for path in found:
         graph, _ = read_graph(path)
         graph.inhabitable[:] = True
-        cases.append(flood_case(graph, path.resolve().name, device))
+        cases.append(flood_case(graph, path.resolve().name, device, PLAIN_OPEN_SOURCES))
     return cases
 
 
-def flood_case(graph: CellGraph, scene: str, device: str) -> Case:
+def flood_case(graph: CellGraph, scene: str, device: str, plain_sources: int = PLAIN_SOURCES) -> Case:
     """The engine on a bare graph whose cells are all inhabitable, beside the plain kernel.
 
     The truth is an exact search from some cells.
@@ -179,7 +202,7 @@ def flood_case(graph: CellGraph, scene: str, device: str) -> Case:
     engine = Engine(None, graph, None, seed=0, threads=1, device=device)
     sources = np.arange(graph.cell_count)
     plain = Engine(None, graph, None, seed=0, threads=1, device="cpu").model.device_graph
-    judged, few = spread(JUDGED_SOURCES, graph.cell_count), spread(PLAIN_SOURCES, graph.cell_count)
+    judged, few = spread(JUDGED_SOURCES, graph.cell_count), spread(plain_sources, graph.cell_count)
 
     def judge(found: tuple[np.ndarray, np.ndarray]) -> Errors:
         potential, seen = found
