@@ -33,7 +33,11 @@ CURVES = {
     "series": [
         {"method": "portals", "knob": "area", "points": [POINT, POINT | {"value": 2, "seconds": 2.0, "error": 1.5}]},
         {"method": "both", "knob": "no knob", "points": [POINT | {"seconds": 1.0, "error": 1.05}]},
-        {"method": "sampling", "knob": "rays", "points": [POINT | {"seconds": 0.1, "error": 0.6, "wrong_hidden": 7}]},
+        {
+            "method": "sampling",
+            "knob": "rays",
+            "points": [POINT | {"seconds": 0.1, "wrong_hidden": 7}, POINT | {"seconds": 0.2}],
+        },
         {"method": "levels", "knob": "pixels", "points": [POINT | {"seconds": None, "unknown": None}]},
     ],
 }
@@ -153,6 +157,7 @@ def test_sightlines_are_the_witnesses_to_half_a_unit(house):
         rows = sorted(getattr(house, table).to_pylist(), key=lambda row: (row["cell_id"], row[column]))
         rows = [row for row in rows if row["verdict"] == "visible" and row["origin_x"] is not None]
         packed = found[name]
+        assert packed["lines"].min() == 0 and packed["lines"].max(axis=(0, 1)).max() == 65535
         ends = np.array(packed["low"]) + np.array(packed["unit"]) * packed["lines"]
         origin, way = (
             np.array([[row[f"{end}_{k}"] for k in "xyz"] for row in rows]) for end in ("origin", "direction")
@@ -206,7 +211,13 @@ def test_names_cannot_leave_the_data(house):
     assert found["facts"]["source"] == name
 
 
-@given(st.lists(st.tuples(st.integers(0, 1), *[st.integers(0, 6)] * 4), max_size=12))
+OWNER, NEAR = st.integers(0, 1), st.integers(0, 6)
+LEVEL = st.tuples(OWNER, NEAR, st.integers(0, 1), NEAR).map(lambda s: (s[0], s[1], s[2], s[3], s[2]))
+UPRIGHT = LEVEL.map(lambda s: (s[0], s[2], s[1], s[4], s[3]))
+ANY = st.tuples(OWNER, NEAR, NEAR, NEAR, NEAR)
+
+
+@given(st.lists(LEVEL | UPRIGHT | ANY, max_size=12))
 def test_joined_segments_cover_the_same(segments):
     """Axial segments of an owner cover the same unit intervals once; the others are kept once, points are dropped."""
     rows = np.array(segments, np.int64).reshape(-1, 5)
@@ -243,7 +254,7 @@ def test_plans_are_cut_and_coarser_where_there_is_too_much(house, monkeypatch):
     assert len(storeys[0]["lines"]) > 8
     monkeypatch.setattr(report_page, "SEGMENTS_MOST", len(storeys[0]["lines"]) - 1)
     (coarse,) = content(page(house, "house"))["storeys"]
-    assert coarse["step"] > 8 and len(coarse["lines"]) < len(storeys[0]["lines"])
+    assert 8 < coarse["step"] <= 1024 and 0 < len(coarse["lines"]) < len(storeys[0]["lines"])
 
 
 def test_a_bare_graph_and_an_empty_one_have_pages(tmp_path):
@@ -449,6 +460,12 @@ def test_a_browser_shows_what_is_clicked(browser, house, tmp_path):
     assert "UNKNOWN" in shown.text("#target") and "portal 0" not in shown.text("#target")
     shown.click(cells[5])
     assert "HIDDEN" in shown.text("#target") and shown.text("#cell-title") == "Cell 0 (hall)"
+    # A target may become the view cell; its own sightlines are found, beyond the row without one.
+    shown.click(cells[2])
+    shown.one("#target button").click()
+    assert shown.text("#cell-title") == "Cell 2 (room)" and not shown.one("#target").is_displayed()
+    shown.click(cells[4])
+    assert "Through 2 portals: cell 2 → portal 2 → cell 3 → portal 3 → cell 4" in shown.text("#target")
     shot = tmp_path / "shot.png"
     assert browser.save_screenshot(str(shot)) and shot.stat().st_size > 20_000
     assert not shown.complaints()

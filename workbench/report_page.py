@@ -197,8 +197,6 @@ def _objects(bake: "Bake") -> dict:
 
 def _storeys(bake: "Bake", storeys: list[Storey]) -> list[dict]:
     """Floor and section of every storey [grid steps], and where the section cuts the model."""
-    if not storeys:
-        return []
     if bake.scene is None:
         triangles, owners = np.zeros((0, 3, 3), np.int32), np.zeros(0, np.int32)
     else:
