@@ -220,6 +220,12 @@ def test_a_row_without_truth_is_none():
         measure(case, "cpu")
 
 
+def test_a_row_names_where_its_work_ran(small):
+    elsewhere = replace(make_cases("stab", 40, "cpu")[0], device="gpu")
+    assert measure(elsewhere, "cpu")[0].device == "gpu"
+    assert measure(replace(elsewhere, device=None), "cpu")[0].device == "cpu"
+
+
 def test_a_broken_kernel_fails(small, monkeypatch, capsys, tmp_path):
     launch = rows_portals.launch_stab
     monkeypatch.setattr(rows_portals, "launch_stab", lambda *a, **k: all_hidden(launch(*a, **k)))

@@ -3,6 +3,7 @@
 from functools import partial
 from itertools import pairwise
 
+import jax
 import numpy as np
 
 from ...kernels import select as select_kernels
@@ -72,6 +73,7 @@ def judge_selection(asked: Problem, found: Selections) -> Errors:
 
 def projection_point_cases(n: int, device: str) -> list[Case]:
     """Projection points of n programmes; the gap is proved in rationals, the error is the violation [m]."""
+    # JAX takes a device of its own.
     del device
     problems = programmes(n, ROWS, seed=n)
     few = problems[:CLARABEL_POINTS]
@@ -95,5 +97,6 @@ def projection_point_cases(n: int, device: str) -> list[Case]:
             reference=lambda: [cone_point(one) for one in few],
             share=len(few) / n,
             modules=[],
+            device=jax.default_backend(),
         )
     ]

@@ -111,6 +111,7 @@ class Case:
         baseline: name of the other way.
         reference: does `share` of the same work in that way.
         modules: Warp modules that the work needs.
+        device: where the work runs, if not on the device named to `measure`.
     """
 
     kernel: str
@@ -123,6 +124,7 @@ class Case:
     reference: Callable[[], object]
     share: float
     modules: Sequence[str]
+    device: str | None = None
 
 
 @dataclass(frozen=True)
@@ -205,7 +207,7 @@ def measure(case: Case, device: str) -> tuple[Row, Noise]:
         kernel=case.kernel,
         scene=case.scene,
         method=case.method,
-        device=device,
+        device=case.device or device,
         n=case.n,
         ms_median=median,
         ms_min=min(times),
