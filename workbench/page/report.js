@@ -9,6 +9,7 @@
   const ROW_UNKNOWN = 0,
     ROW_SIGHTLINE = 1;
   const ROLE_WORD = ["occluder", "detail", "transparent"];
+  const PLAN_LEAST = 400;
   const LISTED = 200,
     ROWS_SHOWN = 12;
   const FILL = {
@@ -636,10 +637,19 @@
     canvas.dataset.view = `${state.view.x} ${state.view.y} ${state.view.scale}`;
   }
 
+  /** As high as the building needs at this width, and the window has room for. */
+  function wantedHeight() {
+    const { low, high } = extent();
+    const needed = (1.1 * width * (high[1] - low[1])) / Math.max(1, high[0] - low[0]) + 60;
+    const room = Math.max(PLAN_LEAST, window.innerHeight - 270);
+    return Math.round(Math.min(Math.max(needed, PLAN_LEAST), room));
+  }
+
   function resize() {
     const ratioOf = window.devicePixelRatio || 1,
       first = !width;
     width = canvas.clientWidth;
+    canvas.style.height = `${wantedHeight()}px`;
     height = canvas.clientHeight;
     canvas.width = Math.round(width * ratioOf);
     canvas.height = Math.round(height * ratioOf);
