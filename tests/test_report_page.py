@@ -28,19 +28,17 @@ HOUSE = runpy.run_path(str(Path(__file__).with_name("small_house.py")))
 GRID = 2.0**-10
 TABLES = {"cellRows": ("cell_to_cell", "reached_cell_id"), "objectRows": ("cell_to_object", "object_id")}
 POINT = {"value": 1, "seconds": 0.5, "error": 1.25, "unknown": 0.2, "wrong_hidden": 0}
-CURVES = {
-    "scene": "house",
-    "series": [
-        {"method": "portals", "knob": "area", "points": [POINT, POINT | {"value": 2, "seconds": 2.0, "error": 1.5}]},
-        {"method": "both", "knob": "no knob", "points": [POINT | {"seconds": 1.0, "error": 1.05}]},
-        {
-            "method": "sampling",
-            "knob": "rays",
-            "points": [POINT | {"seconds": 0.1, "wrong_hidden": 7}, POINT | {"seconds": 0.2}],
-        },
-        {"method": "levels", "knob": "pixels", "points": [POINT | {"seconds": None, "unknown": None}]},
-    ],
+SAFE = [
+    {"method": "portals", "knob": "area", "points": [POINT, POINT | {"value": 2, "seconds": 2.0, "error": 1.5}]},
+    {"method": "both", "knob": "no knob", "points": [POINT | {"seconds": 1.0, "error": 1.05}]},
+]
+UNSAFE = {
+    "method": "sampling",
+    "knob": "rays",
+    "points": [POINT | {"seconds": 0.1, "wrong_hidden": 7}, POINT | {"seconds": 0.2}],
 }
+LEVELS = {"method": "levels", "knob": "pixels", "points": [POINT | {"seconds": None, "unknown": None}]}
+CURVES = {"scene": "house", "series": [one | {"apart": False} for one in (*SAFE, UNSAFE, LEVELS)]}
 
 
 @pytest.fixture

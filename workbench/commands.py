@@ -226,8 +226,9 @@ def tune_lod(options: argparse.Namespace) -> int:
     _start_warp()
     made = load(options.bake)
     from ..solvers.benefit import BenefitSettings
-    from .tune_lod import default_out, write_tuning
     from .tune_lod import tune_lod as tune
+    from .tune_lod import write_tuning
+    from .tune_page import default_out
 
     benefit = BenefitSettings(always=tuple(options.always))
     result = tune(

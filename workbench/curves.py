@@ -52,7 +52,8 @@ class Point:
 
     Attributes:
         value: of the knob.
-        seconds: of visibility, for all view cells, preparation apart; NaN where time is not what it trades.
+        seconds: of visibility, for all view cells, preparation apart (of sampling: all in all); NaN where time is not
+            what it trades.
         error: potential / seen; of the knob pixels the share of triangles that is drawn.
         unknown: share of the potential pairs without a witness, or NaN.
         wrong_hidden: pairs hidden although seen.
@@ -277,16 +278,11 @@ def _seconds(made: "Bake") -> float:
 def _sampled(made: "Bake", knob: str, counts: tuple[int, ...], cells: bool, seed: int) -> Iterator[_Run]:
     """What so many rays from each inhabitable cell show, as if nothing else were there."""
     stands = made.graph.inhabitable
-    # The first is thrown away: what it takes is preparation.
-    for rays in (1, *counts):
+    for rays in counts:
         begin = time.perf_counter()
         found = seen_by_rays(made, rays * int(stands.sum()), seed)[0 if cells else 1]
-        seconds = time.perf_counter() - begin
-        if rays == 1:
-            prepared = seconds
-            continue
         found[~stands] = False
-        yield _Run(SAMPLING, knob, rays, max(seconds - prepared, 1e-3), found, found)
+        yield _Run(SAMPLING, knob, rays, time.perf_counter() - begin, found, found)
 
 
 def _seen(made: "Bake") -> np.ndarray:
@@ -391,11 +387,12 @@ def curves_plot(curves: Curves) -> bytes:
     _draw_safe(panels[0], safe)
     for one in sampled:
         hidden = [100 * p.wrong_hidden / curves.pairs for p in one.points]
-        panels[1].plot([p.seconds for p in one.points], hidden, "X-", color=COLOURS[3])
+        panels[1].plot([p.value for p in one.points], hidden, "X-", color=COLOURS[3])
         for p, y in zip(one.points, hidden, strict=True):
-            panels[1].annotate(f"{p.value:,.0f}", (p.seconds, y), (5, 5), textcoords="offset points", fontsize=8)
-    panels[1].set(xscale="log", xlabel="seconds of casting", ylabel="seen pairs that it hides [%]")
-    panels[1].set_title(f"sampling alone is not safe ({sampled[0].knob})", fontsize=10)
+            panels[1].annotate(f"{p.seconds:.1f} s", (p.value, y), (5, 5), textcoords="offset points", fontsize=8)
+        panels[1].set(xscale="log", xlabel=one.knob, ylabel="seen pairs that it hides [%]", ylim=(0, None))
+    panels[1].set_title("sampling alone is not safe", fontsize=10)
+    panels[1].margins(x=0.15)
     for one in drawn:
         panels[2].plot([p.value for p in one.points], [100 * p.error for p in one.points], "o-", color=COLOURS[0])
         panels[2].set(xscale="log", xlabel="deviation allowed on the image [pixels]", ylabel="triangles drawn [%]")

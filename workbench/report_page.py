@@ -120,6 +120,7 @@ def read_curves_json(path: str | Path) -> dict:
                 "method": str(one["method"]),
                 "knob": str(one["knob"]),
                 "points": [{key: _finite(point[key]) for key in POINT_KEYS} for point in one["points"]],
+                "apart": bool(one.get("apart", False)),
             }
             for one in found["series"]
         ]

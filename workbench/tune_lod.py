@@ -480,9 +480,3 @@ def _finite(values: dict) -> dict:
     return {
         name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in values.items()
     }
-
-
-def default_out(bake: Bake) -> Path:
-    """Where a tuning goes that was not told where: named after the bake, beside it."""
-    folder = Path(bake.folder).resolve()
-    return folder.with_name(f"{folder.name}.tune")

@@ -1228,7 +1228,8 @@
       `${data.curves.scene}. Each mark is one setting of a knob, whose value stands beside it; to the left is ` +
       "faster, further down is tighter. The thick black line is the Pareto front: no setting on this page is both " +
       "faster and tighter. Methods that hide something visible are left out of the picture, and listed in the table.";
-    const front = paretoFront(points);
+    // Series of other view cells than the rest are not to be compared with it point by point.
+    const front = paretoFront(series.filter((one) => !one.apart).flatMap((one) => one.points));
     $("curves").append(curvePicture(series, points, front), curveTable(front));
   }
 
