@@ -47,7 +47,7 @@ class VlodSettings:
         seed: of random points.
     """
 
-    clusters: int = 26
+    clusters: int = 14
     objective: str = "socp"
     resolution: int = 512
     shells: int = 0

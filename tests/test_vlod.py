@@ -84,8 +84,8 @@ def office():
 
 SETTINGS = {
     "centre": CENTRE,
-    "26 random": VlodSettings(objective="random"),
-    "26 cone programmes": VlodSettings(resolution=256),
+    "26 random": VlodSettings(26, objective="random"),
+    "26 cone programmes": VlodSettings(26, resolution=256),
     "6 linear programmes": VlodSettings(clusters=6, objective="lp", resolution=256),
     "8 shells": replace(CENTRE, shells=8),
     "6 clusters, split": replace(CENTRE, clusters=6, split=2, resolution=128),

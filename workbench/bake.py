@@ -85,7 +85,7 @@ class Settings:
     refine_triangles: int = 100_000
     refine_gap: float = 0.25
     certify: bool = False
-    clusters: int = 26
+    clusters: int = 14
     objective: str = "socp"
     resolution: int = 512
     split: bool = False

@@ -419,10 +419,9 @@ def _draw_safe(axes: "Axes", series: list[Series]) -> None:
             for p in points:
                 axes.annotate(f"{p.value:g}", (p.seconds, _above(p)), (5, 4), textcoords="offset points", fontsize=7)
     front = pareto_points(series)
-    axes.step(
-        [p.seconds for p in front], [_above(p) for p in front], where="post", color="black", linewidth=2, zorder=0
-    )
-    axes.plot([], [], color="black", linewidth=2, label="Pareto front")
+    xs, ys = [p.seconds for p in front], [_above(p) for p in front]
+    ring = {"marker": "o", "markersize": 12, "fillstyle": "none", "color": "black", "linewidth": 2}
+    axes.step(xs, ys, where="post", label="Pareto front", **ring)
     axes.set(xscale="log", yscale="log", xlabel="seconds of visibility", ylabel="overestimate: potential / seen - 1")
     axes.set_title("nothing visible is hidden", fontsize=10)
 
