@@ -31,7 +31,8 @@ ROOT = Path(__file__).resolve().parents[1]
 BUILDINGS = runpy.run_path(str(Path(__file__).with_name("random_buildings.py")))
 CASES = load_hard_cases()
 # Kernels that take seconds.
-LONG = ("launch_shrink", "launch_occludees", "vlod_hidden", "solve_points", *(f"bake {m}" for m in METHODS[1:]))
+LONG = ("launch_shrink", "launch_occludees", "launch_deviation", "launch_raster", "vlod_hidden", "solve_points")
+LONG += tuple(f"bake {m}" for m in METHODS[1:])
 
 
 def polygons(shapes):
