@@ -297,6 +297,9 @@ def launch_line_trees(
 
     Returns:
         A tree for every row. One without words could not be told: its pair has no certificate.
+
+    Raises:
+        InputError: a coordinate beyond the grid, where products of differences are no longer exact.
     """
     room = np.asarray(nodes, np.int64) * NODE_WORDS + ROOT_WORDS
     sizes, words = [np.zeros(0, np.int64)], [np.zeros(0, np.int32)]

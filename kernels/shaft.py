@@ -550,6 +550,9 @@ def launch_shaft(
 
     Returns:
         Answers. Hidden is exact for eyes outside every solid. Unknown says nothing: the box may be hidden or not.
+
+    Raises:
+        InputError: a coordinate beyond the grid, where products of differences are no longer exact.
     """
     count = len(rows)
     low, high = vectors(boxes[:, 0], device), vectors(boxes[:, 1], device)

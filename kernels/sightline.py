@@ -419,6 +419,9 @@ def launch_aim(
 
     Returns:
         Found, shape (n,), bool; origins and ends [grid steps], shape (n, 3), float64, defined where found.
+
+    Raises:
+        InputError: a coordinate of a box beyond the grid.
     """
     count = len(sources)
     aims = Aims()

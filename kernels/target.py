@@ -564,6 +564,9 @@ def launch_target_search(
         Answers. Hidden is exact: no open set of lines passes. Visible is exact for the blockers given, and its line
         keeps the widest clearance that was found (1024, 256, ... 1 grid steps, or whatever the first line had). Unknown
         is neither: keep it.
+
+    Raises:
+        InputError: a coordinate beyond the grid, where products of differences are no longer exact.
     """
     count = len(rows)
     work = Pairs()
