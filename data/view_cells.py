@@ -53,6 +53,13 @@ class ViewCells:
     ids: np.ndarray
 
 
+def write_view_cells(boxes: np.ndarray, scene: Scene, path: str | Path) -> None:
+    """Boxes [grid steps], shape (n, 2, 3), as a table in the model's own metres, which `read_view_cells` gives back."""
+    rows = boxes.reshape(-1, 6) * scene.grid_m + np.tile(scene.origin, 2)
+    lines = [",".join(f"{value:.10f}" for value in row) for row in rows]
+    Path(path).write_text("\n".join(["min_x,min_y,min_z,max_x,max_y,max_z", *lines]) + "\n", encoding="utf-8")
+
+
 def read_view_cells(path: str | Path, scene: Scene) -> CellGraph:
     """View cells of a table, Parquet or CSV: min_x ... max_z, and if they are there cell_id, inhabitable and name.
 

@@ -32,6 +32,14 @@ def thread_count(threads: int | None) -> int:
     return threads or allowed or 1
 
 
+def check_device(device: str) -> None:
+    """Refuse a device that Warp does not know with an InputError."""
+    try:
+        wp.get_device(device)
+    except Exception as error:  # Warp raises several types for an unknown or absent device
+        raise InputError(f"device: expected one that Warp knows, found {device!r} ({error})") from None
+
+
 def vectors(rows: np.ndarray, device: str) -> wp.array:
     """Corners in grid steps, three integers each, as a Warp array of vec3i.
 

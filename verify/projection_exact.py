@@ -74,6 +74,16 @@ def optimality(problem: "Problem", point: np.ndarray) -> Optimality:
     return Optimality(value, bound, weights or {}, max(0, *(-s for s in slack)), behind)
 
 
+def relative_gap(problem: "Problem", point: np.ndarray) -> float:
+    """Proved distance from the optimum, relative to the value and what a cell diagonal makes; NaN without a bound.
+
+    The second keeps optima of 0 comparable, where all occluders have their way.
+    """
+    proved = optimality(problem, point)
+    unit = Fraction(float(problem.weights.sum() * problem.scale**2))
+    return float(proved.gap / (proved.value + unit)) if proved.gap is not None else float("nan")
+
+
 def lower_bound(problem: "Problem", at: Point, weights: dict[int, Fraction]) -> Fraction | None:
     """What no feasible point undercuts, by weights of rows; None if they prove nothing. The checker of `Optimality`."""
     value, gradient = _value(problem, at)

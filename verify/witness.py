@@ -5,6 +5,7 @@ Shares no code with the engines that found it.
 """
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -17,6 +18,9 @@ from .sightline import Sight, Sightlines, sure_sign
 # The object of a witness must be hit by the sightline prolonged by this factor.
 PROLONGED = 1.001
 CHUNK = 100_000
+
+if TYPE_CHECKING:
+    from ..data.database import Bake
 
 REASONS = (
     "confirmed",
@@ -85,6 +89,13 @@ class Witnesses:
 def visible_rows(table: pa.Table) -> pa.Table:
     """The rows whose verdict is visible."""
     return table.filter(pc.equal(pc.cast(table["verdict"], pa.string()), "visible"))
+
+
+def witnessed_objects(bake: "Bake") -> np.ndarray:
+    """Objects with a witness, shape (cells, objects), bool."""
+    rows, out = visible_rows(bake.cell_to_object), np.zeros_like(bake.potential_objects)
+    out[rows["cell_id"].to_numpy(), rows["object_id"].to_numpy()] = True
+    return out
 
 
 def read_witnesses(table: pa.Table, target: str, grid_m: float) -> Witnesses:

@@ -327,13 +327,12 @@ def _check(settings: Settings, budget_s: float | None, threads: int | None, devi
         raise InputError(f"depth: expected a whole number from 0 to {DEEPEST}, found {settings.depth}")
     import warp as wp
 
+    from ..kernels.launch import check_device
+
     # Warp greets whoever starts it, unless told not to before.
     wp.config.log_level = wp.LOG_WARNING
     _vlod_settings(settings)
-    try:
-        wp.get_device(device)
-    except Exception as error:  # Warp raises several types for an unknown or absent device
-        raise InputError(f"device: expected one that Warp knows, found {device!r} ({error})") from None
+    check_device(device)
 
 
 def _vlod_settings(settings: Settings) -> "VlodSettings":

@@ -9,11 +9,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import warp as wp
 from tqdm import tqdm
 
 from .. import __version__
 from ..data.errors import InputError
+from ..kernels.launch import check_device
 from ..verify.bench import suite as suites
 from ..verify.bench.growth import Growth, growth_steps, run_growth
 from ..verify.bench.rows_portals import graph_cases
@@ -145,10 +145,7 @@ def bench(
     unknown = [name for name in only if name not in KERNELS]
     if unknown:
         raise InputError(f"only: expected names among {', '.join(KERNELS)}, found {', '.join(map(repr, unknown))}")
-    try:
-        wp.get_device(device)
-    except Exception as error:  # Warp raises several types for an unknown or absent device
-        raise InputError(f"device: expected one that Warp knows, found {device!r} ({error})") from None
+    check_device(device)
     result = BenchResult(suite, device)
     work = [(kernel, n) for kernel in KERNELS if not only or kernel in only for n in suites.SIZES[suite][kernel]]
     given = graph_cases(Path(graphs), device) if graphs is not None else []

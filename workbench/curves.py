@@ -19,11 +19,13 @@ import numpy as np
 from tqdm import tqdm
 
 from ..data.errors import InputError
-from ..verify.witness import visible_rows
+from ..data.view_cells import write_view_cells
+from ..verify.witness import visible_rows, witnessed_objects
 from .bake import Settings, bake
 from .summary import table
 from .tune_plots import COLOURS, MARKERS
 from .verify import seen_by_rays
+from .whole_files import write_files
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -196,7 +198,7 @@ class _Sweeper:
             return
         boxes = whole.graph.cells[whole.graph.inhabitable].astype(np.int64)
         made = self._bake(boxes, Settings(method="occluders"))
-        seen, most = _seen(made), _seconds(made)
+        seen, most = witnessed_objects(made), _seconds(made)
         for share in SHARES:
             early = self._bake(boxes, Settings(method="occluders"), max(share * most, 1e-3))
             potential = early.potential_objects
@@ -227,11 +229,8 @@ class _Sweeper:
     def _bake(self, boxes: np.ndarray, settings: Settings, budget_s: float | None = None) -> "Bake":
         """A bake of view cells [grid steps], in a folder of its own."""
         self._count += 1
-        table = self._folder / f"{self._count}.csv"
-        scene = self._scene
-        rows = boxes.reshape(-1, 6) * scene.grid_m + np.tile(scene.origin, 2)
-        lines = [",".join(f"{value:.10f}" for value in row) for row in rows]
-        table.write_text("\n".join(["min_x,min_y,min_z,max_x,max_y,max_z", *lines]) + "\n", encoding="utf-8")
+        table, scene = self._folder / f"{self._count}.csv", self._scene
+        write_view_cells(boxes, scene, table)
         settings = Settings(**(asdict(settings) | {"cells": str(table), "seed": self._seed}))
         return bake(scene, self._folder / f"{self._count}.bake", settings=settings, budget_s=budget_s)
 
@@ -247,7 +246,7 @@ class _Sweeper:
         ends = np.cumsum([0, *map(len, boxes)])
         potential, seen = (
             np.array([rows[a:b].any(axis=0) for a, b in pairwise(ends)])
-            for rows in (made.potential_objects, _seen(made))
+            for rows in (made.potential_objects, witnessed_objects(made))
         )
         return _Run(method, "parts on an axis", parts, _seconds(made), potential, seen)
 
@@ -267,7 +266,7 @@ class _GraphSweeper:
 
 
 def _run(made: "Bake", method: str, knob: str, value: float) -> _Run:
-    return _Run(method, knob, value, _seconds(made), made.potential_objects, _seen(made))
+    return _Run(method, knob, value, _seconds(made), made.potential_objects, witnessed_objects(made))
 
 
 def _seconds(made: "Bake") -> float:
@@ -283,13 +282,6 @@ def _sampled(made: "Bake", knob: str, counts: tuple[int, ...], cells: bool, seed
         found = seen_by_rays(made, rays * int(stands.sum()), seed)[0 if cells else 1]
         found[~stands] = False
         yield _Run(SAMPLING, knob, rays, time.perf_counter() - begin, found, found)
-
-
-def _seen(made: "Bake") -> np.ndarray:
-    """Objects with a witness, shape (cells, objects), bool."""
-    rows, out = visible_rows(made.cell_to_object), np.zeros_like(made.potential_objects)
-    out[rows["cell_id"].to_numpy(), rows["object_id"].to_numpy()] = True
-    return out
 
 
 def _seen_cells(made: "Bake") -> np.ndarray:
@@ -333,15 +325,8 @@ def write_curves(curves: Curves, folder: Path) -> None:
     Raises:
         InputError: the folder cannot be written.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".curves.") as scratch:
-            (Path(scratch) / "curves.json").write_text(json.dumps(_content(curves), indent=1) + "\n", encoding="utf-8")
-            (Path(scratch) / "curves.png").write_bytes(curves_plot(curves))
-            for name in ("curves.png", "curves.json"):
-                (Path(scratch) / name).replace(folder / name)
-    except OSError as error:
-        raise InputError(f"{folder}: expected a folder to write to, found {error.strerror}") from None
+    text = json.dumps(_content(curves), indent=1) + "\n"
+    write_files(folder, lambda: {"curves.png": curves_plot(curves), "curves.json": text.encode()})
 
 
 def _content(curves: Curves) -> dict:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import warp as wp
 
-from ..data.errors import InputError
+from ..kernels.launch import check_device
 from ..verify.hard_cases import FOLDER, HardCases, load_hard_cases
 from .hard_kernels import KERNELS, Outcome
 
@@ -56,10 +56,7 @@ def run_hard_cases(
     cases = load_hard_cases(folder)
     devices = ["cpu", *(d.alias for d in wp.get_cuda_devices()[:1])] if devices is None else list(devices)
     for device in devices:
-        try:
-            wp.get_device(device)
-        except Exception as error:  # Warp raises several types for an unknown or absent device
-            raise InputError(f"device: expected one that Warp knows, found {device!r} ({error})") from None
+        check_device(device)
     return [_row(kernel, device, cases) for kernel in kernels or KERNELS for device in devices]
 
 

@@ -7,19 +7,18 @@ is a bug. Beside them rays of Embree in float32 without an exact test, which is 
 
 import io
 import json
-import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-import warp as wp
 from tqdm import tqdm
 
 from ..data.errors import InputError
 from ..data.scene import GRID_LIMIT, GRID_M
 from ..data.verdict import Verdict
+from ..kernels.launch import check_device
 from ..kernels.stab import HIDDEN, STABBED
 from ..kernels.stab_batch import launch_stab
 from ..verify.casefile import StabCase
@@ -29,6 +28,7 @@ from ..verify.stab_exact import stab
 from .hard_kernels import KERNELS, Outcome
 from .summary import table
 from .tune_plots import MARKERS
+from .whole_files import write_files
 
 # Okabe and Ito's seven; the last one is for what is wrong.
 PALETTE = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#000000", "#d55e00")
@@ -79,10 +79,7 @@ def measure_stability(
     Raises:
         InputError: an unknown device.
     """
-    try:
-        wp.get_device(device)
-    except Exception as error:  # Warp raises several types for an unknown or absent device
-        raise InputError(f"device: expected one that Warp knows, found {device!r} ({error})") from None
+    check_device(device)
     rows: list[Row] = []
     sweeps = list(_sweeps(cases or CASES, seed))
     for knob, value, hard in tqdm(sweeps, desc="stability", unit="value", disable=not progress):
@@ -237,16 +234,8 @@ def write_stability(rows: list[Row], folder: Path) -> None:
     Raises:
         InputError: the folder cannot be written.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".stability.") as name:
-            scratch = Path(name)
-            (scratch / "stability.json").write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
-            (scratch / "stability.png").write_bytes(stability_plot(rows))
-            for file in sorted(scratch.iterdir()):
-                file.replace(folder / file.name)
-    except OSError as error:
-        raise InputError(f"{folder}: expected a folder to write to, found {error.strerror}") from None
+    text = json.dumps([asdict(row) for row in rows], indent=1) + "\n"
+    write_files(folder, lambda: {"stability.json": text.encode(), "stability.png": stability_plot(rows)})
 
 
 def stability_plot(rows: list[Row]) -> bytes:

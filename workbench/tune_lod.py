@@ -2,7 +2,6 @@
 
 import json
 import os
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -40,6 +39,7 @@ from ..solvers.select_greedy import incremental_greedy, literal_greedy
 from .path import potential_on, read_path, walk
 from .software_renderer import SAMPLE_FRAMES, SoftwareRenderer, fit_renderer, measure_samples
 from .summary import table
+from .whole_files import write_files
 
 FRAMES = 300
 # Budgets unless given: parts of the work in the 95th percentile of the frames at its finest, beside an empty frame.
@@ -429,23 +429,19 @@ def write_tuning(
     """
     from .tune_plots import lod_page, lod_plot
 
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".tune-lod.") as scratch:
-            made = Path(scratch)
-            picture = lod_plot(tuning, Path(bake.folder).name)
-            (made / "tune-lod.png").write_bytes(picture)
-            page = lod_page(tuning, Path(bake.folder).name, picture)
-            (made / "tune-lod.html").write_text(page, encoding="utf-8")
-            if tuning.samples is not None:
-                pyarrow.csv.write_csv(pa.table(tuning.samples), made / "samples.csv")
-            content = _content(tuning, bake, screen, benefit, coherence, asked or {})
-            (made / "tune-lod.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-            for file in sorted(made.iterdir()):
-                os.replace(file, folder / file.name)
-    except OSError as error:
-        raise InputError(f"{folder}: expected a folder to write to, found {error.strerror}") from None
+    folder, name = Path(out), Path(bake.folder).name
+
+    def files() -> dict[str, bytes]:
+        picture = lod_plot(tuning, name)
+        made = {"tune-lod.png": picture, "tune-lod.html": lod_page(tuning, name, picture).encode()}
+        if tuning.samples is not None:
+            samples = pa.BufferOutputStream()
+            pyarrow.csv.write_csv(pa.table(tuning.samples), samples)
+            made["samples.csv"] = samples.getvalue().to_pybytes()
+        content = _content(tuning, bake, screen, benefit, coherence, asked or {})
+        return made | {"tune-lod.json": (json.dumps(content, indent=1) + "\n").encode()}
+
+    write_files(folder, files)
     return folder / "tune-lod.json"
 
 

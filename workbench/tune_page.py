@@ -4,7 +4,6 @@ import base64
 import html
 import io
 import json
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from ..data.errors import InputError
 from .tune_plots import COLOURS, MARKERS, STYLE
+from .whole_files import write_files
 
 if TYPE_CHECKING:
     from ..data.database import Bake
@@ -121,19 +120,11 @@ def write_tune(
         ],
     }
     files = {
-        "png": picture,
-        "html": _page(title, picture, head, rows, notes).encode(),
-        "json": (json.dumps(content, indent=1) + "\n").encode(),
+        f"tune-{tuned}.png": picture,
+        f"tune-{tuned}.html": _page(title, picture, head, rows, notes).encode(),
+        f"tune-{tuned}.json": (json.dumps(content, indent=1) + "\n").encode(),
     }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=f".tune-{tuned}.") as scratch:
-            for suffix, data in files.items():
-                (Path(scratch) / f"tune-{tuned}.{suffix}").write_bytes(data)
-            for suffix in files:
-                (Path(scratch) / f"tune-{tuned}.{suffix}").replace(folder / f"tune-{tuned}.{suffix}")
-    except OSError as error:
-        raise InputError(f"{folder}: expected a folder to write to, found {error.strerror}") from None
+    write_files(folder, lambda: files)
     return folder / f"tune-{tuned}.json"
 
 

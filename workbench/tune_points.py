@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ from tqdm import tqdm
 
 from ..data.errors import InputError
 from ..data.occludees import find_occludees
-from ..verify.witness import visible_rows
+from ..verify.witness import witnessed_objects
 from .bake import opaque_rectangles
 from .tune_page import Candidate, default_out, pareto_front, write_tune
 
@@ -166,12 +165,7 @@ class _Bench:
         self._triangles = np.bincount(scene.triangles()[1], minlength=len(scene.objects))
         sizes = np.bincount(self._owners, minlength=len(scene.objects))
         self._weights = (self._triangles / np.maximum(sizes, 1))[self._owners]
-        rows = visible_rows(bake.cell_to_object)
-        place = np.full(bake.graph.cell_count, -1)
-        place[cells] = np.arange(len(cells))
-        mine = place[rows["cell_id"].to_numpy()] >= 0
-        self._seen = np.zeros((len(cells), len(scene.objects)), bool)
-        self._seen[place[rows["cell_id"].to_numpy()[mine]], rows["object_id"].to_numpy()[mine]] = True
+        self._seen = witnessed_objects(bake)[cells]
         self._problems: list[Problem] = []
 
     def warm(self, settings: "VlodSettings") -> None:
@@ -245,7 +239,7 @@ class _Bench:
         self, name: str, solve: "Callable[[list[Problem]], list[Result]]", problems: "list[Problem]"
     ) -> SolverRow:
         from ..solvers.result import Status
-        from ..verify.projection_exact import optimality
+        from ..verify.projection_exact import relative_gap
 
         begin = time.perf_counter()
         results = solve(problems)
@@ -253,18 +247,13 @@ class _Bench:
         points = np.concatenate([r.point for r in results])
         status = np.concatenate([r.status for r in results])
         names, counts = np.unique(status, return_counts=True)
-        gaps = [Fraction(0)]
-        for number in np.flatnonzero(status == Status.SOLVED)[:PROVED]:
-            proved = optimality(problems[number], points[number])
-            if proved.gap is not None:
-                # Relative to the value, or to what a cell diagonal makes where the optimum is 0.
-                unit = problems[number].weights.sum() * problems[number].scale ** 2
-                gaps.append(proved.gap / (proved.value + Fraction(float(unit))))
+        proved = np.flatnonzero(status == Status.SOLVED)[:PROVED]
+        gaps = np.array([0.0, *(relative_gap(problems[number], points[number]) for number in proved)])
         violation = max(
             float((p.bounds - p.rows @ point).max(initial=0.0)) for p, point in zip(problems, points, strict=True)
         )
         words = ", ".join(f"{count} {Status(code).name.lower()}" for code, count in zip(names, counts, strict=True))
-        return SolverRow(name, len(problems), micros, words, float(max(gaps)), max(0.0, violation) * self._grid_m)
+        return SolverRow(name, len(problems), micros, words, float(np.nanmax(gaps)), max(0.0, violation) * self._grid_m)
 
     def _keep(self, problems: "list[Problem]") -> np.ndarray:
         self._problems = self._problems + problems

@@ -21,14 +21,14 @@ from ...data.errors import InputError
 from ...data.readers import read
 from ...data.scene import Role, Scene
 from ...data.solids import triangles_meet_boxes
-from ...data.view_cells import as_graph, model_bounds
+from ...data.view_cells import as_graph, model_bounds, write_view_cells
 from ...kernels.engine import Sights
 from ...kernels.occlusion import Occlusion, seen_objects
 from ...kernels.shaft import launch_shaft
 from ...kernels.vlod import VlodSettings, join_outlines, rectangle_outlines, vlod_hidden
 from ...workbench.bake import Settings, opaque_rectangles
 from ...workbench.verify import seen_by_rays
-from ..witness import visible_rows
+from ..witness import witnessed_objects
 from .timing import commit, print_head, print_row, quiet
 
 RAYS = 10_000_000
@@ -168,13 +168,10 @@ def compare(scene: Scene, name: str, count: int, rays: int, only: str) -> None:
     seen = np.zeros((len(cells), len(scene.objects)), bool)
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / "cells.csv"
-        rows = cells.reshape(-1, 6) * scene.grid_m + np.tile(scene.origin, 2)
-        lines = [",".join(f"{value:.10f}" for value in row) for row in rows]
-        table.write_text("\n".join(["min_x,min_y,min_z,max_x,max_y,max_z", *lines]) + "\n")
+        write_view_cells(cells, scene, table)
         made = bake(scene, Path(folder) / "cells.bake", settings=Settings(method="occluders", cells=str(table)))
         result = verify(made, rays=rays)
-        rows = visible_rows(made.cell_to_object)
-        seen[rows["cell_id"].to_numpy(), rows["object_id"].to_numpy()] = True
+        seen |= witnessed_objects(made)
         seen |= seen_by_rays(made, rays, 1)[1]
     regions, patches = occluders
     found = f"seen {seen[:count].sum():,} / {seen[count:].sum():,}"

@@ -24,6 +24,7 @@ from ...data.incidence import populate
 from ...data.occludees import find_occludees
 from ...data.scene import Role, Scene
 from ...data.scene_folder import write_scene
+from ...data.view_cells import write_view_cells
 from ...kernels.engine import find_occluders, with_details
 from ...kernels.vlod import VlodSettings, VlodStats, join_outlines, rectangle_outlines, split_cell, vlod_hidden
 from ...solvers.benefit import find_sightings
@@ -227,10 +228,8 @@ def _share_a_face(a: np.ndarray, b: np.ndarray) -> bool:
 
 def _table(scene: Scene, cells: np.ndarray, folder: Path) -> str:
     """View cells as a table that `bake` reads."""
-    rows = cells.reshape(-1, 6) * scene.grid_m + np.tile(scene.origin, 2)
-    lines = [",".join(f"{value:.10f}" for value in row) for row in rows]
     path = folder / "cells.csv"
-    path.write_text("\n".join(["min_x,min_y,min_z,max_x,max_y,max_z", *lines]) + "\n", encoding="utf-8")
+    write_view_cells(cells, scene, path)
     return str(path)
 
 

@@ -7,14 +7,13 @@ import argparse
 import sys
 import time
 from collections.abc import Callable
-from fractions import Fraction
 
 import numpy as np
 
 from ...solvers.projection_point import Problem, solve_points
 from ...solvers.referees import cone_point, gradient_point
 from ...solvers.result import Result, Status
-from ..projection_exact import optimality
+from ..projection_exact import relative_gap
 from .timing import commit, median_range, print_head, print_row
 
 RUNS = 7
@@ -64,13 +63,6 @@ def programmes(count: int, rows: int, seed: int) -> list[Problem]:
     return out
 
 
-def proved_gap(problem: Problem, point: np.ndarray) -> float:
-    """Distance from the optimum, proved in rationals, relative to the value and what a cell diagonal makes."""
-    proved = optimality(problem, point)
-    unit = Fraction(float(problem.weights.sum() * problem.scale**2))
-    return float(proved.gap / (proved.value + unit)) if proved.gap is not None else float("nan")
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -97,7 +89,7 @@ def main(arguments: list[str] | None = None) -> int:
     for name, (given, _) in ways.items():
         points = np.concatenate([r.point for r in answers[name]])
         status = np.concatenate([r.status for r in answers[name]])
-        gap = max(proved_gap(p, point) for p, point in zip(given[:PROVED], points, strict=False))
+        gap = max(relative_gap(p, point) for p, point in zip(given[:PROVED], points, strict=False))
         short = max(float((p.bounds - p.rows @ v).max(initial=0.0)) for p, v in zip(given, points, strict=True))
         solved = f"{(status == Status.SOLVED).sum():,} of {len(given):,}"
         ratio = f"{base / np.median(times[name]):.1f}"

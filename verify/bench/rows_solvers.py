@@ -12,7 +12,8 @@ from ...solvers.projection_point import solve_points
 from ...solvers.referees import cone_point
 from ...solvers.result import Result
 from ..knapsack_exact import best_by_milp, upper_bound
-from .projection_point import GRID_M, programmes, proved_gap
+from ..projection_exact import relative_gap
+from .projection_point import GRID_M, programmes
 from .select import LEVELS, Problem, highs, problem
 from .suite import Case, Errors, silenced
 
@@ -79,7 +80,7 @@ def projection_point_cases(n: int, device: str) -> list[Case]:
     few = problems[:CLARABEL_POINTS]
 
     def judge(found: Result) -> Errors:
-        gaps = [proved_gap(p, point) for p, point in zip(problems[:PROVED_POINTS], found.point, strict=False)]
+        gaps = [relative_gap(p, point) for p, point in zip(problems[:PROVED_POINTS], found.point, strict=False)]
         short = max(
             float((p.bounds - p.rows @ point).max(initial=0.0)) for p, point in zip(problems, found.point, strict=True)
         )
