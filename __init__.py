@@ -8,17 +8,17 @@ from importlib import import_module
 __version__ = "0.1.0"
 
 _HOME = {
-    "Bake": "viewcell.data.database",
+    "Bake": "viewcell.data.store.database",
     "InputError": "viewcell.data.errors",
     "Scene": "viewcell.data.scene",
     "Verdict": "viewcell.data.verdict",
-    "assert_conservative": "viewcell.workbench.check",
-    "bake": "viewcell.workbench.bake",
-    "check": "viewcell.workbench.check",
-    "load": "viewcell.data.database",
+    "assert_conservative": "viewcell.workbench.check.run",
+    "bake": "viewcell.workbench.bake.run",
+    "check": "viewcell.workbench.check.run",
+    "load": "viewcell.data.store.database",
     "make_office": "viewcell.data.buildings.office",
     "read": "viewcell.data.readers",
-    "report": "viewcell.workbench.report",
+    "report": "viewcell.workbench.report.run",
     "verify": "viewcell.workbench.verify",
 }
 

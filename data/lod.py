@@ -1,6 +1,6 @@
 """Levels of detail: simplified meshes to choose from, objects by connected component, and how far a level sticks out.
 
-Nothing here says how far a simplified mesh is from its original; `solvers.lod_chain` measures that.
+Nothing here says how far a simplified mesh is from its original; `solvers.levels.chain` measures that.
 """
 
 from dataclasses import replace

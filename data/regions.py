@@ -63,7 +63,7 @@ def find_regions(scene: Scene, opaque: OpaquePlanes, *, sections: bool = True) -
 
     Args:
         scene: the model.
-        opaque: its opaque rectangles (kernels/engine.py adds those of furniture).
+        opaque: its opaque rectangles (solvers/visibility/engine.py adds those of furniture).
         sections: cut closed elements too.
     """
     least = LEAST_M2 / scene.grid_m**2

@@ -14,11 +14,11 @@ import pyarrow.csv
 
 from .errors import InputError
 from .graph import CellGraph
-from .graph_folder import CELL_COLUMNS, inhabitable_column, numbers, optional_column
 from .opaque import OpaquePlanes
 from .scene import GRID_LIMIT, Scene
-from .scene_folder import one_line, read_table
 from .solids import closed_elements, dead_cells
+from .store.graph_folder import CELL_COLUMNS, inhabitable_column, numbers, optional_column
+from .store.scene_folder import one_line, read_table
 
 # An eye is at most this far above the floor that it walks on.
 EYE_M = 2.0

@@ -6,7 +6,7 @@ left of the triangle of directions is a convex polygon, whose edges are cuts; th
 over the polygon is at a corner, and there the two edges and the cut add up to something that is nowhere negative (the
 dual of a linear programme in two variables). Every corner is tried with exact signs, so a tree that is written holds.
 
-The words of a tree are explained in data/certificates.py.
+The words of a tree are explained in data/store/certificates.py.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from ..data import certificates
+from ..data.store import certificates
 from .graph import reflect_high, reflect_low
 from .launch import SlotSizes, run_sliced, triples, vectors
 from .stab import (

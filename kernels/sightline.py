@@ -2,7 +2,7 @@
 
 A sightline is accepted only if float64 is certain that it clears every opaque triangle: each orientation carries a
 bound on its rounding, and a doubtful one counts as blocked. So an accepted sightline is never wrong; a rejected one may
-be clear. (The exact check of every stored witness is verify/sightline.py, which shares nothing with this file.)
+be clear. (The exact check of every stored witness is verify/exact/sightline.py, which shares nothing with this file.)
 
 Source of the bound: Shewchuk 1997, "Adaptive Precision Floating-Point Arithmetic", orient3d, stage A.
 """

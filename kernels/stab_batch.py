@@ -138,7 +138,7 @@ class StabAnswers:
         w: of a stabbed row's line, float64, shape (n, 3): component i of the direction is sign_i / w_i.
         xi: coordinate i of the line at time t is sign_i (t + xi_i) / w_i, float64, shape (n, 3).
         cuts: tags of a hidden row's cuts, -1 where there is no more, shape (n, 25), int32; the last one completes the
-            proof, together with at most two others (see `verify.stab_certificate`).
+            proof, together with at most two others (see `verify.proofs.stab_cuts`).
     """
 
     verdict: np.ndarray

@@ -1,13 +1,11 @@
 import os
-import runpy
 import shutil
 from pathlib import Path
 
 import pytest
+from builders import four_rooms
 from hypothesis import settings
 from viewcell.workbench.cli import main
-
-ROOMS = runpy.run_path(str(Path(__file__).with_name("four_rooms.py")))
 
 settings.register_profile("dev", max_examples=60, deadline=None)
 settings.register_profile("ci", max_examples=60, derandomize=True, deadline=None)
@@ -17,7 +15,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.enviro
 
 @pytest.fixture(scope="module")
 def graph(tmp_path_factory):
-    return ROOMS["write_graph"](tmp_path_factory.mktemp("graph") / "rooms")
+    return four_rooms.write_graph(tmp_path_factory.mktemp("graph") / "rooms")
 
 
 @pytest.fixture(scope="module")

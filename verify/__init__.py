@@ -5,7 +5,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..data.database import Bake
+    from ..data.store.database import Bake
     from .findings import VerifyResult
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .confidence import Confidence
+from .rays.confidence import Confidence
 
 SHOWN = 10
 KINDS = ("object", "cell")

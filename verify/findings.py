@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .certified import Certified
-from .confidence import Confidence
-from .rays import Caster
-from .witness import Confirmed, visible_rows
+from .proofs.certified import Certified
+from .rays.confidence import Confidence
+from .rays.embree import Caster
+from .rays.witness import Confirmed, visible_rows
 
 if TYPE_CHECKING:
-    from ..data.database import Bake
+    from ..data.store.database import Bake
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,7 @@ def make_scaled(options: argparse.Namespace) -> int:
 def _scene_writer(name: str) -> tuple[Path, Callable[["Scene", Path], None]]:
     """Where to write a scene, and how, by the name's ending."""
     from ..data.buildings.glb import write_glb
-    from ..data.scene_folder import write_scene
+    from ..data.store.scene_folder import write_scene
 
     writers = {".scene": write_scene, ".glb": write_glb}
     out = Path(name)
@@ -67,9 +67,9 @@ def _scene_writer(name: str) -> tuple[Path, Callable[["Scene", Path], None]]:
 
 def bake(options: argparse.Namespace) -> int:
     """Bake a model and print what came of it."""
-    from .bake import Settings, default_out
-    from .bake import bake as compute
-    from .settings_file import SettingsFile, read_settings
+    from .bake.run import Settings, default_out
+    from .bake.run import bake as compute
+    from .bake.settings_file import SettingsFile, read_settings
 
     _start_warp()
     model = Path(options.model)
@@ -128,7 +128,7 @@ def _stamp(out: Path) -> tuple[int, int] | None:
 
 def verify(options: argparse.Namespace) -> int:
     """Check a bake, or one case; the exit code says whether it stood."""
-    from ..data.database import load
+    from ..data.store.database import load
 
     _start_warp()
     if options.hard_cases:
@@ -148,7 +148,7 @@ def verify(options: argparse.Namespace) -> int:
         say(outcome.line())
         return 0 if outcome.ok else FAILED
     if options.certificates:
-        from ..verify.line_certificate import check_certificates
+        from ..verify.proofs.line_tree import check_certificates
 
         found = check_certificates(made)
         say("\n".join([found.line(), *(f"refuted: {line}" for line in found.examples)]))
@@ -160,7 +160,7 @@ def verify(options: argparse.Namespace) -> int:
 
 def _hard_cases(options: argparse.Namespace) -> int:
     """Put the hard cases to every kernel; the exit code says whether one was wrong."""
-    from .hard_cases import hard_cases_table, run_hard_cases
+    from .hard.run import hard_cases_table, run_hard_cases
 
     if options.bake is not None or options.replay is not None or options.certificates:
         raise InputError("verify: expected no bake, case or certificates beside --hard-cases")
@@ -172,8 +172,8 @@ def _hard_cases(options: argparse.Namespace) -> int:
 def check(options: argparse.Namespace) -> int:
     """Check claims of any baker; the exit code says whether something visible was found hidden."""
     _start_warp()
-    from .check import check as look
-    from .check_folder import check_place, replay, write_check
+    from .check.folder import check_place, replay, write_check
+    from .check.run import check as look
 
     if options.replay is not None:
         left, lines = replay(options.replay, options.model)
@@ -204,8 +204,8 @@ def check(options: argparse.Namespace) -> int:
 
 def tune_points(options: argparse.Namespace) -> int:
     """Try ways to choose projection points, print what came of it and write it down."""
-    from ..data.database import load
-    from .tune_points import point_lines, tune_projection_point
+    from ..data.store.database import load
+    from .tune.points import point_lines, tune_projection_point
 
     _start_warp()
     found = tune_projection_point(
@@ -220,15 +220,15 @@ def tune_points(options: argparse.Namespace) -> int:
 def tune_lod(options: argparse.Namespace) -> int:
     """Try ways to choose levels of detail, print what came of it and write it down."""
     from ..data.camera import Screen
-    from ..data.database import load
+    from ..data.store.database import load
 
     screen = Screen(*options.resolution, options.fov)
     _start_warp()
     made = load(options.bake)
-    from ..solvers.benefit import BenefitSettings
-    from .tune_lod import tune_lod as tune
-    from .tune_lod import write_tuning
-    from .tune_page import default_out
+    from ..solvers.levels.benefit import BenefitSettings
+    from .tune.lod import tune_lod as tune
+    from .tune.lod import write_tuning
+    from .tune.page import default_out
 
     benefit = BenefitSettings(always=tuple(options.always))
     result = tune(
@@ -251,10 +251,10 @@ def tune_lod(options: argparse.Namespace) -> int:
 
 def report(options: argparse.Namespace) -> int:
     """Write a report and say where it is."""
-    from ..data.database import load
+    from ..data.store.database import load
 
     made = load(options.bake)
-    from .report import report as write
+    from .report.run import report as write
 
     text = write(made, cells=options.cells, out=options.out, curves=options.curves)
     say(f"{text}\n{text.with_suffix('.html')}")
@@ -264,9 +264,9 @@ def report(options: argparse.Namespace) -> int:
 def bench(options: argparse.Namespace) -> int:
     """Measure, print the table, write it down and compare it with an earlier run."""
     _start_warp()
-    from ..verify.bench.against import compare, load_bench
-    from .bench import bench as run
-    from .bench import check_writable, write_bench
+    from .bench.against import compare, load_bench
+    from .bench.run import bench as run
+    from .bench.run import check_writable, write_bench
 
     old = load_bench(Path(options.against)) if options.against else None
     if options.json:
@@ -314,7 +314,7 @@ def _progress(options: argparse.Namespace) -> bool:
 
 def curves(options: argparse.Namespace) -> int:
     """Sweep the knobs, draw the curves and say which settings are worth their time."""
-    from ..data.database import load
+    from ..data.store.database import load
     from .curves import curve_lines, sweep, write_curves
 
     if options.stability == (options.bake is not None):
@@ -333,7 +333,7 @@ def curves(options: argparse.Namespace) -> int:
 
 def _stability(options: argparse.Namespace) -> int:
     """Error of the kernels as numbers get hard."""
-    from .stability import FLOAT32, measure_stability, stability_table, write_stability
+    from .hard.stability import FLOAT32, measure_stability, stability_table, write_stability
 
     rows = measure_stability(seed=options.seed, device=options.device, progress=_progress(options))
     folder = Path(options.out or "stability")
@@ -345,8 +345,8 @@ def _stability(options: argparse.Namespace) -> int:
 
 def export(options: argparse.Namespace) -> int:
     """Write cells and portals as a portal file and say how to judge what another tool makes of them."""
-    from ..data.database import load
-    from ..data.quake import UNIT_STEPS, write_prt
+    from ..data.store.database import load
+    from ..data.store.quake import UNIT_STEPS, write_prt
 
     made, out = load(options.bake), Path(options.prt)
     if not made.graph.portal_count:

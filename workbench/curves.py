@@ -20,17 +20,17 @@ from tqdm import tqdm
 
 from ..data.errors import InputError
 from ..data.view_cells import write_view_cells
-from ..verify.witness import visible_rows, witnessed_objects
-from .bake import Settings, bake
+from ..verify.rays.witness import visible_rows, witnessed_objects
+from .bake.run import Settings, bake
+from .files import write_files
 from .summary import table
-from .tune_plots import COLOURS, MARKERS
+from .tune.plots import COLOURS, MARKERS
 from .verify import seen_by_rays
-from .whole_files import write_files
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..data.database import Bake
+    from ..data.store.database import Bake
 
 THRESHOLDS_M2 = (0.0, 1.0, 4.0)
 SPLITS = (1, 2)
@@ -208,7 +208,7 @@ class _Sweeper:
     def pixel_series(self) -> Series | None:
         """Share of the triangles that is drawn as the limit on the image's deviation grows."""
         from ..data.lod import object_errors
-        from ..kernels.pixel_error import PixelLimit, pixel_levels
+        from ..solvers.levels.pixel_error import PixelLimit, pixel_levels
 
         scene, points = self._scene, []
         shapes = [[len(mesh.faces) for mesh in scene.definitions[o.definition_id].lods] for o in scene.objects]
@@ -239,7 +239,7 @@ class _Sweeper:
 
     def _split(self, method: str, parts: int) -> _Run:
         """View cells cut in parts on each axis; a cell sees what a part sees."""
-        from ..kernels.vlod import split_cell
+        from ..solvers.visibility.projection import split_cell
 
         boxes = [split_cell(box, parts) for box in self._boxes]
         made = self._bake(np.concatenate(boxes), Settings(method="occluders"))

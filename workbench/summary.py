@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..data.database import Bake
+    from ..data.store.database import Bake
 
 SKIPPED_SHOWN = 3
 LEAK_SHOWN = 12
@@ -37,7 +37,7 @@ def summary(bake: "Bake") -> str:
 
 def _certificates(bake: "Bake") -> str:
     """Number of proofs, their size on disk, and what it took to write them down."""
-    from ..data.certificates import TABLES
+    from ..data.store.certificates import TABLES
 
     count, seconds = bake.manifest["counts"]["proofs"], bake.manifest["certificate_s"]
     size = sum((bake.folder / f"{name}.parquet").stat().st_size for name in TABLES)

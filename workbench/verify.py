@@ -12,20 +12,20 @@ from tqdm import tqdm
 
 from ..data.errors import InputError
 from ..data.scene import Role
-from ..verify.adjudicate import Judge, Judgement, sightline_end
-from ..verify.aims import ORIGINS_MOST, aim_points, cell_origins, frontier_points
-from ..verify.casefile import WrongHidden, read_case, write_case
-from ..verify.falsify import Falsifier
+from ..verify.cases.case_file import WrongHidden, read_case, write_case
+from ..verify.exact.sightline import Sightlines
 from ..verify.findings import VerifyResult, count_pairs
-from ..verify.hints import certificate_hints
-from ..verify.line_certificate import check_certificates, has_certificates
-from ..verify.rays import Candidates, Caster
-from ..verify.sightline import Sightlines
-from ..verify.walk import contact_links, portal_links
-from ..verify.witness import CHUNK, confirm_cells, confirm_objects, read_witnesses, visible_rows
+from ..verify.proofs.line_tree import check_certificates, has_certificates
+from ..verify.rays.adjudicate import Judge, Judgement, sightline_end
+from ..verify.rays.embree import Candidates, Caster
+from ..verify.rays.falsify import Falsifier
+from ..verify.rays.near_misses import certificate_hints
+from ..verify.rays.starts import ORIGINS_MOST, aim_points, cell_origins, frontier_points
+from ..verify.rays.trace import contact_links, portal_links
+from ..verify.rays.witness import CHUNK, confirm_cells, confirm_objects, read_witnesses, visible_rows
 
 if TYPE_CHECKING:
-    from ..data.database import Bake
+    from ..data.store.database import Bake
 
 BATCH_RAYS = 100_000
 # Rays of a cell at a time where nothing is judged in between.
@@ -118,7 +118,7 @@ def replay(path: str | Path, bake: "Bake | None" = None) -> Replayed:
     """
     case = read_case(path)
     if bake is None:
-        from ..data.database import load
+        from ..data.store.database import load
 
         bake = load(case.bake)
     table = bake.potential_cells if case.kind == "cell" else bake.potential_objects

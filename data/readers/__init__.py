@@ -58,7 +58,7 @@ def read(
 
 
 def _read_folder(path: Path, grid_m: float) -> Scene:
-    from ..scene_folder import read_scene
+    from ..store.scene_folder import read_scene
 
     scene = read_scene(path)
     if grid_m not in (GRID_M, scene.grid_m):

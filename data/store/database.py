@@ -1,0 +1,290 @@
+"""The bake folder, format 1: the display database that others read. Parquet (zstd) and JSON only.
+
+Metres, relative to `origin`, Z up, right-handed. Rows exist for inhabitable cells; a row that is absent means HIDDEN.
+A witness is the sightline from `origin_*` to `origin_* + direction_*`.
+"""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from ..errors import InputError
+from ..graph import OTHER_AXES, CellGraph
+from ..scene import Scene
+from ..verdict import Verdict
+from .graph_folder import CELL_COLUMNS, PORTAL_COLUMNS, read_graph
+from .scene_folder import new_folder, read_manifest, read_table
+from .scene_tables import meshes_table, objects_table, scene_from_tables
+
+WITNESS = ("origin_x", "origin_y", "origin_z", "direction_x", "direction_y", "direction_z")
+CELL_TO_CELL = ("cell_id", "reached_cell_id", "verdict", "portals", *WITNESS)
+CELL_TO_OBJECT = ("cell_id", "object_id", "verdict", *WITNESS)
+CELL_LODS = ("cell_id", "object_id", "lod")
+
+
+@dataclass
+class VisibleRows:
+    """Rows of cell_to_cell or cell_to_object, ordered by source, then target.
+
+    Attributes:
+        source: inhabitable cell, shape (n,), int32.
+        target: reached cell or object, shape (n,), int32.
+        seen: whether there is a witness, shape (n,), bool.
+        origin: [grid steps], shape (n, 3), float64; undefined where not seen.
+        end: likewise.
+        portal_starts: shape (n + 1,), int64, or None for objects.
+        portals: crossed portals of row r are portals[portal_starts[r]:portal_starts[r + 1]], int32.
+    """
+
+    source: np.ndarray
+    target: np.ndarray
+    seen: np.ndarray
+    origin: np.ndarray
+    end: np.ndarray
+    portal_starts: np.ndarray | None = None
+    portals: np.ndarray | None = None
+
+
+NO_CELL_ROWS = VisibleRows(
+    *(np.zeros(0, np.int32) for _ in range(2)),
+    np.zeros(0, bool),
+    *(np.zeros((0, 3)) for _ in range(2)),
+    np.zeros(1, np.int64),
+    np.zeros(0, np.int32),
+)
+
+
+class Bake:
+    """A finished bake: the model, its cells and portals, and what is visible from where.
+
+    Attributes:
+        folder: where it is stored.
+        manifest: contents of manifest.json.
+        grid_m: grid step [m].
+        origin: whole metres subtracted from the model's coordinates, float64 x 3.
+    """
+
+    def __init__(self, folder: Path, manifest: dict) -> None:
+        self.folder = folder
+        self.manifest = manifest
+        self.grid_m = float(manifest["grid_m"])
+        self.origin = np.array(manifest["origin"], np.float64)
+
+    @cached_property
+    def graph(self) -> CellGraph:
+        """Cells and portals [grid steps]; view cells have no portals and may overlap."""
+        return read_graph(self.folder, self.grid_m, disjoint=self.claims_cells)[0]
+
+    @property
+    def claims_cells(self) -> bool:
+        """Whether the bake says which cells see each other; a bake of view cells speaks of objects only."""
+        return "cell_to_cell" in self.manifest.get("claims", ["cell_to_cell"])
+
+    @cached_property
+    def scene(self) -> Scene | None:
+        """The snapped model; None for the bake of a bare cell graph."""
+        if not self.manifest["counts"]["objects"]:
+            return None
+        meshes, objects = (read_table(self.folder / f"{name}.parquet", ()) for name in ("meshes", "objects"))
+        return scene_from_tables(self.manifest, meshes, objects)
+
+    @cached_property
+    def cell_to_cell(self) -> pa.Table:
+        """Reached cells: verdict, portal sequence and witness [m]; no rows in a bake that claims nothing of cells."""
+        if not self.claims_cells:
+            return _cell_to_cell_table(NO_CELL_ROWS, self.grid_m)
+        return read_table(self.folder / "cell_to_cell.parquet", CELL_TO_CELL)
+
+    @cached_property
+    def cell_to_object(self) -> pa.Table:
+        """Reached objects: verdict and witness [m]."""
+        return read_table(self.folder / "cell_to_object.parquet", CELL_TO_OBJECT)
+
+    @cached_property
+    def cell_lods(self) -> pa.Table:
+        """Levels of detail above 0 that potentially visible objects may be drawn at from anywhere in a cell.
+
+        What has no row is drawn at level 0; in a bake without levels of detail that is everything.
+        """
+        path = self.folder / "cell_lods.parquet"
+        if not path.exists():
+            return pa.table({name: pa.array([], pa.int32()) for name in CELL_LODS})
+        return read_table(path, CELL_LODS)
+
+    @cached_property
+    def potential_cells(self) -> np.ndarray:
+        """Potentially visible cells, shape (cells, cells), bool; rows of inhabitable cells only.
+
+        All of them in a bake that claims nothing of cells.
+        """
+        if not self.claims_cells:
+            return np.repeat(self.graph.inhabitable[:, None], self.graph.cell_count, axis=1)
+        return self._matrix(self.cell_to_cell, "reached_cell_id", self.graph.cell_count)
+
+    @cached_property
+    def potential_objects(self) -> np.ndarray:
+        """Potentially visible objects, shape (cells, objects), bool; rows of inhabitable cells only."""
+        return self._matrix(self.cell_to_object, "object_id", self.manifest["counts"]["objects"])
+
+    def potential(self, cell: int) -> np.ndarray:
+        """Ids of the objects that may be visible from somewhere in a cell, ascending: its PVS.
+
+        Raises:
+            InputError: the cell does not exist or is not inhabitable.
+        """
+        return self._objects_of(cell, None)
+
+    def seen(self, cell: int) -> np.ndarray:
+        """Ids of the objects that a stored witness shows to be visible from the cell, ascending.
+
+        Raises:
+            InputError: the cell does not exist or is not inhabitable.
+        """
+        return self._objects_of(cell, Verdict.VISIBLE)
+
+    def _objects_of(self, cell: int, verdict: Verdict | None) -> np.ndarray:
+        if not (0 <= cell < self.graph.cell_count and self.graph.inhabitable[cell]):
+            raise InputError(f"cell: expected the id of an inhabitable cell, found {cell}")
+        table = self.cell_to_object
+        rows = table["cell_id"].to_numpy() == cell
+        if verdict is not None:
+            rows &= np.array(table["verdict"].to_pylist(), object) == verdict.value
+        return np.sort(table["object_id"].to_numpy()[rows])
+
+    def _matrix(self, table: pa.Table, target: str, targets: int) -> np.ndarray:
+        out = np.zeros((self.graph.cell_count, targets), bool)
+        out[table["cell_id"].to_numpy(), table[target].to_numpy()] = True
+        return out
+
+
+def load(folder: str | Path) -> Bake:
+    """Open a bake folder.
+
+    Raises:
+        InputError: it is no bake folder, of another format version, incomplete, or its tables contradict each other.
+    """
+    folder = Path(folder)
+    manifest = read_manifest(folder, kind="bake")
+    missing = [name for name in ("grid_m", "origin", "counts", "settings") if name not in manifest]
+    if missing:
+        raise InputError(f"{folder / 'manifest.json'}: expected the key {missing[0]!r}, found none")
+    bake = Bake(folder, manifest)
+    _check_ids(bake)
+    return bake
+
+
+def _check_ids(bake: Bake) -> None:
+    """Every id in the visibility tables names a row of its own table; every source is inhabitable."""
+    limits = {"cell_id": bake.graph.cell_count, "reached_cell_id": bake.graph.cell_count}
+    limits["object_id"] = int(bake.manifest["counts"]["objects"])
+    for name, table, columns in (
+        ("cell_to_cell", bake.cell_to_cell, ("cell_id", "reached_cell_id")),
+        ("cell_to_object", bake.cell_to_object, ("cell_id", "object_id")),
+    ):
+        for column in columns:
+            ids = table[column].to_numpy()
+            if len(ids) and (ids.min() < 0 or ids.max() >= limits[column]):
+                bad = ids[(ids < 0) | (ids >= limits[column])][0]
+                where = bake.folder / f"{name}.parquet"
+                raise InputError(f"{where}: expected {column} from 0 to {limits[column] - 1}, found {bad}")
+        sources = table["cell_id"].to_numpy()
+        if not bake.graph.inhabitable[sources].all():
+            bad = sources[~bake.graph.inhabitable[sources]][0]
+            where = bake.folder / f"{name}.parquet"
+            raise InputError(f"{where}: expected rows of inhabitable cells only, found cell {bad}")
+
+
+def write_bake(
+    folder: Path,
+    manifest: Callable[[], dict],
+    scene: Scene | None,
+    graph: CellGraph,
+    cell_rows: VisibleRows | None,
+    object_rows: VisibleRows,
+    grid_m: float,
+    more: dict[str, pa.Table] | None = None,
+) -> Bake:
+    """Write a bake folder atomically: a temporary folder beside the target, then a rename.
+
+    The manifest is asked for when the tables are written, so that it can tell how long that took. `more` are tables
+    beyond the format's own, by name.
+
+    Raises:
+        InputError: the disk is full or the place is not writable; what was there before is untouched.
+    """
+    empty = Scene([], [])
+    tables = {
+        "meshes": meshes_table(scene or empty),
+        "objects": objects_table(scene or empty),
+        "cells": cells_table(graph, grid_m),
+        "portals": portals_table(graph, grid_m),
+        "cell_to_object": _cell_to_object_table(object_rows, grid_m),
+    }
+    if cell_rows is not None:
+        tables["cell_to_cell"] = _cell_to_cell_table(cell_rows, grid_m)
+    tables |= more or {}
+
+    with new_folder(folder, kind="bake") as temporary:
+        for name, table in tables.items():
+            pq.write_table(table, temporary / f"{name}.parquet", compression="zstd")
+        final = manifest()
+        (temporary / "manifest.json").write_text(json.dumps(final, indent=1) + "\n", encoding="utf-8")
+    return Bake(folder, final)
+
+
+def cells_table(graph: CellGraph, grid_m: float) -> pa.Table:
+    """Rows of cells.parquet [m]."""
+    values = graph.cells.reshape(-1, 6) * grid_m
+    columns = {"cell_id": pa.array(np.arange(graph.cell_count, dtype=np.int32))}
+    columns |= {name: pa.array(values[:, i]) for i, name in enumerate(CELL_COLUMNS[1:])}
+    columns["inhabitable"] = pa.array(graph.inhabitable)
+    columns["name"] = pa.array([str(name) for name in graph.cell_names], pa.string())
+    return pa.table(columns)
+
+
+def portals_table(graph: CellGraph, grid_m: float) -> pa.Table:
+    """Rows of portals.parquet [m]."""
+    rows = np.arange(graph.portal_count)
+    uv = OTHER_AXES[graph.portal_axis] if graph.portal_count else np.zeros((0, 2), int)
+    metres = graph.portals * grid_m
+    values = [metres[rows, 0, graph.portal_axis]]
+    values += [metres[rows, side, uv[:, c]] for c in (0, 1) for side in (0, 1)]
+    columns = {
+        "portal_id": pa.array(rows.astype(np.int32)),
+        "cell_a": pa.array(graph.portal_cells[:, 0]),
+        "cell_b": pa.array(graph.portal_cells[:, 1]),
+        "axis": pa.array(graph.portal_axis),
+    }
+    return pa.table(columns | {name: pa.array(x) for name, x in zip(PORTAL_COLUMNS[4:], values, strict=True)})
+
+
+def _witness_columns(rows: VisibleRows, grid_m: float) -> dict[str, pa.Array]:
+    # The grid step is a power of two, so metres hold the same points, and both ends are multiples of a 1024th of it.
+    values = np.concatenate([rows.origin * grid_m, rows.end * grid_m - rows.origin * grid_m], axis=1)
+    return {name: pa.array(values[:, i], mask=~rows.seen) for i, name in enumerate(WITNESS)}
+
+
+def _verdicts(rows: VisibleRows) -> pa.Array:
+    return pa.array(np.where(rows.seen, Verdict.VISIBLE.value, Verdict.UNKNOWN.value).astype(object), pa.string())
+
+
+def _cell_to_cell_table(rows: VisibleRows, grid_m: float) -> pa.Table:
+    starts = rows.portal_starts.astype(np.int32)
+    columns = {
+        "cell_id": pa.array(rows.source),
+        "reached_cell_id": pa.array(rows.target),
+        "verdict": _verdicts(rows),
+        "portals": pa.ListArray.from_arrays(pa.array(starts), pa.array(rows.portals.astype(np.int32))),
+    }
+    return pa.table(columns | _witness_columns(rows, grid_m))
+
+
+def _cell_to_object_table(rows: VisibleRows, grid_m: float) -> pa.Table:
+    columns = {"cell_id": pa.array(rows.source), "object_id": pa.array(rows.target), "verdict": _verdicts(rows)}
+    return pa.table(columns | _witness_columns(rows, grid_m))

@@ -1,0 +1,179 @@
+"""A bake-ready scene on disk: one folder of JSON and Parquet, whose tables the bake folder reuses.
+
+`manifest.json`, `meshes.parquet`, `objects.parquet`, `spaces.parquet`, `openings.parquet`. Vertices are stored as
+float32, so a mesh must hold values that float32 holds exactly: the snapped model is then the same before and after.
+"""
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from ..errors import InputError
+from ..scene import Scene
+from .scene_tables import TABLE_COLUMNS, meshes_table, objects_table, openings_table, scene_from_tables, spaces_table
+
+FORMAT = 1
+MANIFEST_KEYS = ("format", "kind", "origin", "grid_m", "unit", "source", "sha256", "skipped", "counts", "complete")
+
+
+def write_scene(scene: Scene, folder: str | Path) -> None:
+    """Write a scene folder in one step: it is there whole, or what was there before still is.
+
+    Args:
+        scene: the scene; mesh vertices must be exact in float32.
+        folder: where to; a scene folder already there is replaced.
+
+    Raises:
+        InputError: the folder holds something else, cannot be written, or a vertex is not exact in float32.
+    """
+    tables = {
+        "meshes": meshes_table(scene),
+        "objects": objects_table(scene),
+        "spaces": spaces_table(scene.spaces),
+        "openings": openings_table(scene.openings),
+    }
+    manifest = scene_manifest(scene) | {"kind": "scene", "complete": True}
+    with new_folder(folder, kind="scene") as temporary:
+        for name, table in tables.items():
+            pq.write_table(table, temporary / f"{name}.parquet", compression="zstd")
+        (temporary / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
+
+
+def read_scene(folder: str | Path) -> Scene:
+    """The scene that `write_scene` wrote.
+
+    Raises:
+        InputError: the folder is missing, incomplete, of another kind or format, or its tables contradict each other.
+    """
+    folder = Path(folder)
+    manifest = read_manifest(folder, kind="scene")
+    missing = [key for key in MANIFEST_KEYS if key not in manifest]
+    if missing:
+        raise InputError(f"{folder / 'manifest.json'}: expected the key {missing[0]!r}, found none")
+    tables = {name: read_table(folder / f"{name}.parquet", columns) for name, columns in TABLE_COLUMNS.items()}
+    try:
+        scene = scene_from_tables(manifest, **tables)
+    except InputError as error:
+        raise InputError(f"{folder}: {error}") from None
+    except (ValueError, TypeError, IndexError, KeyError, AttributeError, pa.ArrowException) as error:
+        raise InputError(f"{folder}: expected a readable scene, found {one_line(error)}") from None
+    return scene
+
+
+def scene_manifest(scene: Scene) -> dict[str, object]:
+    """What a manifest says of the model; ready for JSON."""
+    return {
+        "format": FORMAT,
+        "source": scene.source,
+        "sha256": scene.sha256,
+        "unit": scene.unit,
+        "grid_m": scene.grid_m,
+        "origin": [float(x) for x in scene.origin],
+        "max_snap_m": scene.max_snap_m(),
+        "counts": {
+            "definitions": len(scene.definitions),
+            "objects": len(scene.objects),
+            "triangles": len(scene.triangles()[0]),
+            "spaces": len(scene.spaces),
+            "openings": len(scene.openings),
+            "skipped": len(scene.skipped),
+        },
+        "skipped": scene.skipped,
+    }
+
+
+def read_manifest(folder: str | Path, kind: str) -> dict:
+    """The manifest of a complete folder of this kind and format.
+
+    Raises:
+        InputError: it is missing, unreadable, unfinished, or of another kind or format.
+    """
+    path = Path(folder) / "manifest.json"
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: expected a {kind} folder's manifest, found {error.strerror}") from None
+    except ValueError as error:
+        raise InputError(f"{path}: expected JSON, found {one_line(error)}") from None
+    if not isinstance(manifest, dict):
+        raise InputError(f"{path}: expected a JSON object, found {type(manifest).__name__}")
+    expected = {"format": FORMAT, "kind": kind, "complete": True}
+    for key, value in expected.items():
+        if manifest.get(key) != value:
+            raise InputError(f"{path}: expected {key} {value!r}, found {manifest.get(key)!r}")
+    return manifest
+
+
+def read_table(path: Path, columns: tuple[str, ...]) -> pa.Table:
+    """A Parquet table that has these columns.
+
+    Raises:
+        InputError: it is missing, unreadable, or lacks a column.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: expected a Parquet table, found nothing there")
+    try:
+        table = pq.read_table(path)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(f"{path}: expected a Parquet table, found {one_line(error)}") from None
+    missing = [name for name in columns if name not in table.column_names]
+    if missing:
+        raise InputError(f"{path}: expected the column {missing[0]!r}, found {', '.join(table.column_names)}")
+    return table
+
+
+@contextmanager
+def new_folder(folder: str | Path, kind: str) -> Iterator[Path]:
+    """A temporary folder beside `folder` that takes its place when the block ends well, and vanishes when it does not.
+
+    Raises:
+        InputError: `folder` is there but no folder of this kind, or writing failed (a full disk, no permission).
+    """
+    folder = Path(folder)
+    if folder.exists() and not replaceable(folder, kind):
+        raise InputError(f"{folder}: expected a new name or a {kind} folder to replace, found something else there")
+    temporary = None
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+        temporary.chmod(0o755)
+        yield temporary
+        _replace(temporary, folder)
+    except OSError as error:
+        raise InputError(f"{folder}: expected to be able to write there, found {one_line(error)}") from None
+    finally:
+        if temporary is not None:
+            shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _replace(temporary: Path, folder: Path) -> None:
+    if not folder.exists():
+        os.rename(temporary, folder)
+        return
+    old = temporary.with_name(temporary.name + ".old")
+    os.rename(folder, old)
+    os.rename(temporary, folder)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def replaceable(folder: Path, kind: str) -> bool:
+    """Whether a folder may be replaced: it is of this kind, or empty."""
+    if not folder.is_dir():
+        return False
+    try:
+        return json.loads((folder / "manifest.json").read_text(encoding="utf-8")).get("kind") == kind
+    except (OSError, ValueError, AttributeError):
+        return not any(folder.iterdir())
+
+
+def one_line(error: Exception) -> str:
+    """The first line of an error's message, or its type where it has none."""
+    lines = str(error).strip().splitlines()
+    return lines[0] if lines else type(error).__name__

@@ -1,0 +1,192 @@
+"""The model as Arrow tables, and back: the tables that a scene folder and a bake folder share."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pyarrow as pa
+
+from ..errors import InputError
+from ..scene import Definition, Instance, Mesh, Role, Scene, Space
+
+BOX_COLUMNS = ("min_x", "min_y", "min_z", "max_x", "max_y", "max_z")
+TABLE_COLUMNS = {
+    "meshes": ("definition_id", "lod", "error_m", "vertices", "faces"),
+    "objects": ("object_id", "name", "kind", "definition_id", "transform", "opaque", "role", *BOX_COLUMNS),
+    "spaces": ("name", "vertices", "faces"),
+    "openings": BOX_COLUMNS,
+}
+
+
+def meshes_table(scene: Scene) -> pa.Table:
+    """`meshes.parquet`: one row for each level of detail of each definition.
+
+    Raises:
+        InputError: a vertex is not exact in float32.
+    """
+    rows = [(i, lod, mesh) for i, shape in enumerate(scene.definitions) for lod, mesh in enumerate(shape.lods)]
+    vertices = [mesh.vertices.astype(np.float32) for _, _, mesh in rows]
+    for (i, lod, mesh), stored in zip(rows, vertices, strict=True):
+        if not np.array_equal(stored.astype(np.float64), mesh.vertices):
+            name = scene.definitions[i].name
+            raise InputError(f"definition {i} {name!r} lod {lod}: expected vertices exact in float32, found others")
+    return pa.table(
+        {
+            "definition_id": pa.array([i for i, _, _ in rows], pa.int32()),
+            "lod": pa.array([lod for _, lod, _ in rows], pa.int32()),
+            "error_m": pa.array([mesh.error_m for _, _, mesh in rows], pa.float64()),
+            "vertices": _lists(vertices, np.float32),
+            "faces": _lists([mesh.faces for _, _, mesh in rows], np.int32),
+        },
+        metadata={"definition_names": json.dumps([shape.name for shape in scene.definitions])},
+    )
+
+
+def objects_table(scene: Scene) -> pa.Table:
+    """`objects.parquet`: one row for each object; boxes in metres of the snapped model, null where nothing is left."""
+    boxes = scene.object_bounds()
+    columns = {
+        "object_id": pa.array(range(len(scene.objects)), pa.int32()),
+        "name": pa.array([placed.name for placed in scene.objects], pa.string()),
+        "kind": pa.array([placed.kind for placed in scene.objects], pa.string()),
+        "definition_id": pa.array([placed.definition_id for placed in scene.objects], pa.int32()),
+        "transform": _lists([placed.transform for placed in scene.objects], np.float64),
+        "opaque": pa.array([placed.opaque for placed in scene.objects], pa.bool_()),
+        "role": pa.array([placed.role.value for placed in scene.objects], pa.string()),
+    }
+    return pa.table(columns | _box_columns(boxes * scene.grid_m, empty=boxes[:, 0, 0] > boxes[:, 1, 0]))
+
+
+def spaces_table(spaces: list[Space]) -> pa.Table:
+    """`spaces.parquet`: one row for each room volume, metres, float64."""
+    return pa.table(
+        {
+            "name": pa.array([space.name for space in spaces], pa.string()),
+            "vertices": _lists([space.vertices for space in spaces], np.float64),
+            "faces": _lists([space.faces for space in spaces], np.int32),
+        }
+    )
+
+
+def openings_table(openings: np.ndarray) -> pa.Table:
+    """`openings.parquet`: one row for each box of shape (n, 2, 3), metres."""
+    return pa.table(_box_columns(np.asarray(openings, np.float64).reshape(-1, 2, 3)))
+
+
+def scene_from_tables(
+    manifest: dict,
+    meshes: pa.Table,
+    objects: pa.Table,
+    spaces: pa.Table | None = None,
+    openings: pa.Table | None = None,
+) -> Scene:
+    """The scene that a manifest and its tables describe; `spaces` and `openings` may be left out.
+
+    Raises:
+        InputError: the tables contradict each other or the manifest.
+    """
+    scene = Scene(
+        definitions=_definitions(meshes),
+        objects=_objects(objects),
+        spaces=_spaces(spaces) if spaces is not None else [],
+        openings=_openings(openings) if openings is not None else np.zeros((0, 2, 3)),
+        origin=np.array(manifest["origin"], np.float64),
+        grid_m=float(manifest["grid_m"]),
+        source=str(manifest.get("source", "")),
+        sha256=str(manifest.get("sha256", "")),
+        unit=str(manifest.get("unit", "metre")),
+        skipped=list(manifest.get("skipped", [])),
+    )
+    if scene.origin.shape != (3,) or not np.isfinite(scene.origin).all():
+        raise InputError(f"manifest.json: expected origin to be 3 finite numbers, found {manifest['origin']}")
+    if not 0 < scene.grid_m < np.inf:
+        raise InputError(f"manifest.json: expected grid_m above 0, found {manifest['grid_m']}")
+    _check_counts(scene, manifest.get("counts", {}))
+    return scene
+
+
+def _check_counts(scene: Scene, counts: dict) -> None:
+    found = {"definitions": len(scene.definitions), "objects": len(scene.objects)}
+    for what, count in found.items():
+        if counts.get(what, count) != count:
+            raise InputError(f"manifest.json: expected {counts[what]} {what}, found {count} in the tables")
+    for object_id, placed in enumerate(scene.objects):
+        if not 0 <= placed.definition_id < len(scene.definitions):
+            raise InputError(
+                f"objects.parquet: object {object_id}: expected a definition_id below {len(scene.definitions)}, "
+                f"found {placed.definition_id}"
+            )
+
+
+def _definitions(meshes: pa.Table) -> list[Definition]:
+    names = json.loads((meshes.schema.metadata or {}).get(b"definition_names", b"[]"))
+    ids, lods = meshes["definition_id"].to_pylist(), meshes["lod"].to_pylist()
+    errors = meshes["error_m"].to_pylist()
+    vertices, faces = _arrays(meshes["vertices"], 3), _arrays(meshes["faces"], 3)
+    levels: list[list[Mesh]] = []
+    for row, (definition_id, lod) in enumerate(zip(ids, lods, strict=True)):
+        where = f"meshes.parquet: row {row}"
+        if lod == 0 and definition_id == len(levels):
+            levels.append([])
+        if definition_id != len(levels) - 1 or lod != len(levels[-1]):
+            raise InputError(f"{where}: expected rows in order of definition_id and lod, found {definition_id}, {lod}")
+        _check_faces(faces[row], len(vertices[row]), where)
+        levels[-1].append(Mesh(vertices[row].astype(np.float64), faces[row].astype(np.int32), float(errors[row])))
+    names = names if len(names) == len(levels) else [f"definition {i}" for i in range(len(levels))]
+    return [Definition(name, tuple(meshes)) for name, meshes in zip(names, levels, strict=True)]
+
+
+def _objects(objects: pa.Table) -> list[Instance]:
+    columns = ("object_id", "name", "kind", "definition_id", "role")
+    rows = zip(*(objects[name].to_pylist() for name in columns), _arrays(objects["transform"], 4), strict=True)
+    found = []
+    for row, (object_id, name, kind, definition_id, role, transform) in enumerate(rows):
+        where = f"objects.parquet: row {row}"
+        if object_id != row:
+            raise InputError(f"{where}: expected object_id {row}, found {object_id}")
+        if role not in list(Role):
+            raise InputError(f"{where}: expected role occluder, detail or transparent, found {role!r}")
+        if transform.shape != (4, 4) or not np.isfinite(transform).all():
+            raise InputError(f"{where}: expected a transform of 16 finite numbers, found {transform.size}")
+        found.append(Instance(name, kind, definition_id, transform.astype(np.float64), Role(role)))
+    return found
+
+
+def _spaces(spaces: pa.Table) -> list[Space]:
+    vertices, faces = _arrays(spaces["vertices"], 3), _arrays(spaces["faces"], 3)
+    for row in range(spaces.num_rows):
+        _check_faces(faces[row], len(vertices[row]), f"spaces.parquet: row {row}")
+    rows = zip(spaces["name"].to_pylist(), vertices, faces, strict=True)
+    return [Space(name, points.astype(np.float64), corners.astype(np.int32)) for name, points, corners in rows]
+
+
+def _openings(openings: pa.Table) -> np.ndarray:
+    columns = [openings[name].to_numpy().astype(np.float64) for name in BOX_COLUMNS]
+    return np.stack(columns, axis=1).reshape(-1, 2, 3)
+
+
+def _check_faces(faces: np.ndarray, vertex_count: int, where: str) -> None:
+    if faces.size and not (0 <= faces.min() and faces.max() < vertex_count):
+        raise InputError(f"{where}: expected vertex indices below {vertex_count}, found {faces.min()} to {faces.max()}")
+
+
+def _lists(arrays: list[np.ndarray], dtype: type) -> pa.ListArray:
+    """A list column from arrays of any shape, read row by row."""
+    flat = [np.asarray(array, dtype).ravel() for array in arrays]
+    offsets = np.concatenate([[0], np.cumsum([len(array) for array in flat])]).astype(np.int32)
+    values = np.concatenate([np.zeros(0, dtype), *flat])
+    return pa.ListArray.from_arrays(pa.array(offsets), pa.array(values))
+
+
+def _arrays(column: pa.ChunkedArray, width: int) -> list[np.ndarray]:
+    """Rows of a list column, each of shape (n, width)."""
+    column = column.combine_chunks()
+    values, offsets = column.values.to_numpy(zero_copy_only=False), column.offsets.to_numpy()
+    if (np.diff(offsets) % width).any():
+        raise InputError(f"expected lists of a multiple of {width} numbers, found another length")
+    return [values[a:b].reshape(-1, width) for a, b in pairwise(offsets)]
+
+
+def _box_columns(boxes: np.ndarray, empty: np.ndarray | None = None) -> dict[str, pa.Array]:
+    flat = boxes.reshape(-1, 6)
+    return {name: pa.array(flat[:, i], pa.float64(), mask=empty) for i, name in enumerate(BOX_COLUMNS)}

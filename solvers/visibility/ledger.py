@@ -1,0 +1,126 @@
+"""Keeping the proofs of what is hidden, and going down a hierarchy with them."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from ...data.store.certificates import NO_PROOFS, Proofs, join_proofs
+from ...kernels.line_tree import launch_line_trees
+from ...kernels.shaft import ShaftAnswers
+from ...kernels.target import BlockerTree, TargetAnswers
+
+
+class Ledger:
+    """Collects proofs; with one, only what has a certificate is called hidden."""
+
+    def __init__(self) -> None:
+        self._proofs: list[Proofs] = []
+        self._pairs: list[np.ndarray] = []
+        self._seconds = 0.0
+
+    def add_lines(
+        self,
+        tree: BlockerTree,
+        boxes: np.ndarray,
+        rows: np.ndarray,
+        answers: TargetAnswers,
+        pair: np.ndarray | None = None,
+        *,
+        threads: int = 1,
+        device: str = "cpu",
+    ) -> None:
+        """Enter the line trees of what a search hid; what has none becomes unknown in the answers.
+
+        Args:
+            tree: blockers, as of `launch_target_search`.
+            boxes: likewise.
+            rows: likewise; the source of a row is a view cell, and a strict row is about a closed box.
+            answers: of the search.
+            pair: what each row's target is a piece of, -1 if it is whole, shape (n,); all whole by default.
+            threads: CPU threads.
+            device: Warp device.
+        """
+        start = time.perf_counter()
+        hidden = np.flatnonzero(answers.verdict == 0)
+        nodes = answers.nodes[hidden]
+        trees = launch_line_trees(tree, boxes, rows[hidden], nodes, threads=threads, device=device)
+        told = np.diff(trees.starts) > 0
+        answers.verdict[hidden[~told]] = 2
+        hidden, starts = hidden[told], np.append(trees.starts[:-1][told], trees.starts[-1])
+        none = np.zeros(len(hidden) + 1, np.int64)
+        target = boxes[rows[hidden, 1]].astype(np.int32)
+        proofs = Proofs(
+            rows[hidden, 0].astype(np.int64), target, rows[hidden, 2] != 0, starts, trees.words, none, NO_PROOFS.leaves
+        )
+        self._enter(proofs, pair if pair is None else pair[hidden])
+        self._seconds += time.perf_counter() - start
+
+    def add_shafts(
+        self, cell: np.ndarray, boxes: np.ndarray, answers: ShaftAnswers, pair: np.ndarray | None = None
+    ) -> None:
+        """Enter the pieces of what the shaft test hid from view cells; `pair` as of `add_lines`."""
+        hidden = np.flatnonzero(answers.verdict == 0)
+        starts = np.concatenate([[0], np.cumsum(answers.leaves[hidden])])
+        none, closed = np.zeros(len(hidden) + 1, np.int64), np.ones(len(hidden), bool)
+        proofs = Proofs(
+            cell[hidden].astype(np.int64), boxes[hidden], closed, none, NO_PROOFS.words, starts, answers.certificate
+        )
+        self._enter(proofs, pair if pair is None else pair[hidden])
+
+    def _enter(self, proofs: Proofs, pair: np.ndarray | None) -> None:
+        self._proofs.append(proofs)
+        self._pairs.append(np.full(len(proofs.cell), -1) if pair is None else pair)
+
+    def close(self, hidden: np.ndarray) -> Proofs:
+        """All proofs, without those of pieces of pairs that are not hidden; `hidden` is by pair, bool."""
+        proofs = join_proofs(self._proofs)
+        pair = np.concatenate([np.zeros(0, int), *self._pairs])
+        kept = proofs.take((pair < 0) | np.append(hidden, False)[pair])
+        kept.seconds = self._seconds
+        return kept
+
+
+def descend(
+    cells: np.ndarray,
+    block: np.ndarray,
+    levels: list[np.ndarray],
+    items: np.ndarray,
+    first_level: int,
+    hide: Callable[[np.ndarray, np.ndarray], np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """(view cell, item) pairs that no proof for a box around the item, or around several, hides; ordered.
+
+    Args:
+        cells: all view cells [grid steps], shape (n, 2, 3), int32.
+        block: view cells to look from, shape (m,), int.
+        levels: node bounds of a hierarchy over the items, as of `build_levels`.
+        items: item of each node of the last level, -1 for none.
+        first_level: to start at: the root is visible from everywhere.
+        hide: says of cells and boxes, row by row, which boxes are hidden.
+    """
+    level = min(first_level, len(levels) - 1)
+    source = np.repeat(block, 2**level)
+    node = np.tile(np.arange(2**level), len(block))
+    while True:
+        boxes = levels[level][node]
+        present = (boxes[:, 0] <= boxes[:, 1]).all(axis=1)
+        source, node, boxes = source[present], node[present], boxes[present]
+        left = np.ones(len(node), bool)
+        rows = apart(cells[source], boxes)
+        left[rows] = ~hide(source[rows], boxes[rows])
+        source, node = source[left], node[left]
+        if level == len(levels) - 1:
+            break
+        level += 1
+        source, node = np.repeat(source, 2), (2 * node[:, None] + [0, 1]).ravel()
+    target = items[node].astype(np.int64)
+    order = np.lexsort((target, source))
+    return source[order].astype(np.int64), target[order]
+
+
+def apart(cells: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    """Rows whose open cell does not meet the closed box."""
+    meet = (cells[:, 0] < boxes[:, 1]) & (cells[:, 1] > boxes[:, 0])
+    # A flat box inside the cell has low == high, which lies strictly between the cell's sides.
+    return np.flatnonzero(~(meet[:, 0] & meet[:, 1] & meet[:, 2]))

@@ -1,0 +1,55 @@
+"""Pieces of objects and the hierarchy over them: together they hold every triangle."""
+
+import numpy as np
+import pytest
+from builders import random_solids
+from viewcell.data.occludees import find_occludees
+from viewcell.data.scene import Scene
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_point_of_an_object_lies_in_a_piece_of_it(seed):
+    scene = random_solids.random_solids(seed, axial=4, turned=6)
+    random = np.random.default_rng(seed)
+    found = find_occludees(scene)
+    triangles, owners = scene.triangles()
+    weights = random.dirichlet([1, 1, 1], (len(triangles), 40))
+    points = np.einsum("mkc,mcx->mkx", weights, triangles.astype(float))
+    for object_id in range(len(scene.objects)):
+        pieces = found.pieces[found.starts[object_id] : found.starts[object_id + 1]]
+        mine = points[owners == object_id].reshape(-1, 3)
+        inside = (mine[:, None] >= pieces[:, 0] - 1e-6) & (mine[:, None] <= pieces[:, 1] + 1e-6)
+        assert inside.all(axis=2).any(axis=1).all()
+        assert (pieces[:, 0] >= found.bounds[object_id, 0]).all() and (pieces[:, 1] <= found.bounds[object_id, 1]).all()
+
+
+def test_an_oblique_wall_does_not_fill_its_box():
+    wall = random_solids.box([0, 0, 0], [4, 0.1, 2])
+    angle = np.pi / 4
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    wall.apply_transform(turn)
+    found = find_occludees(random_solids.scene_of_meshes([wall]))
+    size = (found.pieces[:, 1] - found.pieces[:, 0]).astype(float).prod(axis=1).sum()
+    assert size < 0.4 * np.prod((found.bounds[0, 1] - found.bounds[0, 0]).astype(float))
+
+
+def test_a_node_holds_its_children_and_every_object_has_one_leaf():
+    scene = random_solids.random_solids(1, axial=9, turned=4)
+    found = find_occludees(scene)
+    assert sorted(found.objects[found.objects >= 0]) == list(range(len(scene.objects)))
+    leaves = found.levels[-1][found.objects >= 0]
+    np.testing.assert_array_equal(leaves, found.bounds[found.objects[found.objects >= 0]])
+    for above, below in zip(found.levels[:-1], found.levels[1:], strict=True):
+        families = below.reshape(-1, 2, 2, 3)
+        np.testing.assert_array_equal(above[:, 0], families[:, :, 0].min(axis=1))
+        np.testing.assert_array_equal(above[:, 1], families[:, :, 1].max(axis=1))
+
+
+def test_objects_without_triangles_have_no_leaf():
+    scene = random_solids.random_solids(2, axial=2, turned=0)
+    empty = Scene(scene.definitions, scene.objects)
+    empty.definitions[0].lods[0].faces.resize((0, 3), refcheck=False)
+    found = find_occludees(empty)
+    assert found.objects[found.objects >= 0].tolist() == [1]
+    assert found.starts.tolist() == [0, 0, len(found.pieces)]

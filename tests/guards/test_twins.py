@@ -1,0 +1,69 @@
+"""Every kernel that others may launch has a twin in verify/ and a test that holds the two together."""
+
+import ast
+from importlib import import_module
+
+import pytest
+from builders.places import ROOT
+
+# launch function: its file in kernels/, its twin (module of viewcell.verify and name there), the test of both.
+TWINS = {
+    "launch_stab": ("stab_batch", "exact.stab.stab", "kernels/test_stab.py"),
+    # Both searches ask for pairs joined by a stabbing line; builders/random_buildings.py searches with the exact stab.
+    "launch_flood": ("flood", "exact.stab.stab", "kernels/test_flood.py"),
+    "launch_target_search": ("target", "exact.stab.stab", "kernels/test_flood.py"),
+    "launch_line_trees": ("line_tree", "proofs.line_tree.hides", "verify/proofs/test_line_tree.py"),
+    "launch_confirm": ("sightline", "exact.sightline.Sightlines", "kernels/test_sightline.py"),
+    "launch_aim": ("sightline", "exact.sightline.Sightlines", "kernels/test_sightline.py"),
+    "launch_walk": ("trace", "rays.trace.portal_path", "kernels/test_trace.py"),
+    "launch_shaft": ("shaft", "exact.shadow.hides", "kernels/test_shaft.py"),
+    "launch_coverage": ("coverage", "exact.coverage.cover_polygon", "kernels/test_coverage.py"),
+    "launch_backface": ("backface", "exact.backface.back_facing", "kernels/test_backface.py"),
+    "launch_umbra": ("shadow", "exact.shadow.umbra", "kernels/test_shadow.py"),
+    "launch_shrink": ("shadow", "exact.shadow.shrunk", "kernels/test_shadow.py"),
+    "launch_grow_hole": ("shadow", "exact.shadow.grown_hole", "kernels/test_shadow.py"),
+    "launch_occludees": ("occludee", "exact.coverage.covers_box", "kernels/test_coverage.py"),
+    "launch_deviation": ("deviation", "exact.deviation.deviation_squared", "kernels/test_deviation.py"),
+    "launch_select": ("select", "exact.select.best_by_table", "kernels/test_select.py"),
+    "launch_raster": ("raster", "exact.raster.first_hit", "kernels/test_raster.py"),
+}
+
+
+def launchers():
+    """(file stem, name) of every public function in kernels/ whose name starts with launch_."""
+    found = []
+    for path in sorted((ROOT / "kernels").glob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("launch_"):
+                found.append((path.stem, node.name))
+    return found
+
+
+def names_in(path):
+    """Every name that a test file uses, those of the helper files that it loads included."""
+    text = path.read_text(encoding="utf-8")
+    for helper in ROOT.glob("tests/builders/*.py"):
+        if helper.stem in text:
+            text += helper.read_text(encoding="utf-8")
+    tree = ast.parse(text)
+    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+
+
+def test_every_kernel_is_in_the_table():
+    assert {(file, name) for name, (file, _, _) in TWINS.items()} == set(launchers())
+
+
+@pytest.mark.parametrize("launcher", TWINS)
+def test_twin_exists_and_is_compared(launcher):
+    file, twin, test = TWINS[launcher]
+    module, _, name = twin.rpartition(".")
+    assert hasattr(import_module(f"viewcell.kernels.{file}"), launcher)
+    assert hasattr(import_module(f"viewcell.verify.{module}"), name)
+    assert {launcher, name} <= names_in(ROOT / "tests" / test), f"{test} does not compare {launcher} with {twin}"
+
+
+def test_twins_share_no_code_with_kernels():
+    for path in (ROOT / "verify").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                assert "kernels" not in (node.module or ""), f"{path} imports {node.module}"

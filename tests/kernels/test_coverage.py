@@ -1,0 +1,301 @@
+"""Conservative cube maps: covered pixels and tested boxes against rationals, and against rays in large maps."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from viewcell.data.errors import InputError
+from viewcell.kernels.coverage import launch_coverage
+from viewcell.kernels.occludee import launch_occludees
+from viewcell.verify.exact.coverage import cover_polygon, covers_box, touched_pixels
+
+SIZE = 8
+
+
+def rectangle(axis, plane, low, high):
+    """Corners of an axial rectangle; low and high on the next two axes, in cyclic order."""
+    out = np.full((4, 3), float(plane))
+    out[:, (axis + 1) % 3] = [low[0], high[0], high[0], low[0]]
+    out[:, (axis + 2) % 3] = [low[1], low[1], high[1], high[1]]
+    return out
+
+
+def random_polygons(rng, count):
+    """Triangles and axial rectangles on the grid, near and far, small and large, some round a pole of a face."""
+    out = []
+    for _ in range(count):
+        if rng.random() < 0.5:
+            triangle = rng.integers(-3000, 3000, (3, 3)) + rng.integers(-2500, 2500, 3)
+            out.append(triangle.astype(float))
+            continue
+        low = rng.integers(-4000, 2000, 2)
+        plane = rng.choice([-1, 1]) * rng.integers(200, 4000)
+        polygon = rectangle(rng.integers(3), plane, low, low + rng.integers(1, 6000, 2))
+        out.append(polygon[:: rng.choice([-1, 1])])
+    return out
+
+
+def coverage(viewpoint, polygons, owners=None, **options):
+    owners = np.zeros(len(polygons), int) if owners is None else owners
+    starts = np.concatenate([[0], np.cumsum([len(p) for p in polygons])])
+    corners = np.concatenate([*polygons, np.zeros((0, 3))])
+    return launch_coverage(np.atleast_2d(viewpoint), corners, starts, owners, **options)
+
+
+def covered(maps, box):
+    return bool(launch_occludees(maps, np.array([box]), np.array([[0, 0]]))[0])
+
+
+def compare(viewpoint, polygon):
+    """Kernel and twin on one polygon: (pixels that both cover, pixels only the twin covers)."""
+    got = coverage(viewpoint, [polygon], resolution=SIZE).depth(0)
+    both = less = 0
+    for face in range(6):
+        image = cover_polygon(viewpoint, polygon, face, SIZE)
+        for row in range(SIZE):
+            for pixel in range(SIZE):
+                depth, exact = got[face, row, pixel], image[row][pixel]
+                if np.isfinite(depth):
+                    assert exact is not None, f"face {face} row {row} pixel {pixel}: covered, exactly not"
+                    assert Fraction(depth) >= exact, f"face {face} row {row} pixel {pixel}: {depth} < {float(exact)}"
+                    assert depth < float(exact) * (1 + 1e-5)
+                    both += 1
+                elif exact is not None:
+                    less += 1
+    return both, less
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_covered_pixels_are_the_exact_ones(seed):
+    rng = np.random.default_rng(seed)
+    both = 0
+    for polygon in random_polygons(rng, 12):
+        # Off the grid, no pixel's border meets an edge, so that not a single pixel may be lost either.
+        found, less = compare(rng.uniform(-150, 150, 3), polygon)
+        both += found
+        assert less == 0
+    assert both > 100
+
+
+@given(
+    st.integers(0, 2),
+    st.sampled_from([-1, 1]),
+    st.lists(st.integers(0, SIZE), min_size=4, max_size=4),
+    st.lists(st.integers(-1, 1), min_size=4, max_size=4),
+)
+def test_edges_on_pixel_borders(axis, sign, borders, steps):
+    """A rectangle on its own face, its sides one step off the borders of pixels or on them."""
+    place = 1024 * (2 * np.sort(np.reshape(borders, (2, 2)), axis=0) - SIZE) // SIZE + np.reshape(steps, (2, 2))
+    if (place[0] >= place[1]).any():
+        return
+    polygon = rectangle(axis, sign * 1024, *place)
+    face = 2 * axis + (sign < 0)
+    got = coverage(np.zeros(3), [polygon], resolution=SIZE).depth(0)[face]
+    image = cover_polygon(np.zeros(3), polygon, face, SIZE)
+    for row in range(SIZE):
+        for pixel in range(SIZE):
+            if np.isfinite(got[row, pixel]):
+                assert image[row][pixel] is not None
+                assert Fraction(got[row, pixel]) >= image[row][pixel]
+            elif image[row][pixel] is not None:
+                # Only where a side runs along the pixel's border does rounding decide.
+                assert any(on_border(pixel, place[:, 0]) + on_border(row, place[:, 1]))
+
+
+def on_border(pixel, ends):
+    return [end == 1024 * (2 * i - SIZE) // SIZE for end in ends for i in (pixel, pixel + 1)]
+
+
+def test_axial_rectangle_gets_whole_rows_and_columns():
+    polygon = rectangle(0, 1000, (-510, -240), (260, 770))
+    depth = coverage(np.zeros(3), [polygon], resolution=64).depth(0)
+    inner = np.zeros((64, 64), bool)
+    # Borders at (2 i - 64) / 64: from ceil((-0.24 + 1) 32) to floor((0.77 + 1) 32) rows, likewise pixels.
+    inner[25:56, 16:40] = True
+    np.testing.assert_array_equal(np.isfinite(depth[0]), inner)
+    np.testing.assert_allclose(depth[0][inner], 1000, rtol=1e-6)
+    assert not np.isfinite(depth[1:]).any()
+
+
+def test_a_closed_room_hides_what_is_outside():
+    """Six walls, each longer than the room, so that no face has a crack; seen from a corner of the room."""
+    walls = [rectangle(axis, k, (-5000, -5000), (5000, 5000)) for axis in range(3) for k in (-1000, 1000)]
+    maps = coverage([313.7, -777.3, 910.1], walls, resolution=64)
+    assert np.isfinite(maps.depth(0)).all()
+    # A box on three faces of the map, one below all of the room, and one close behind the wall that the map looks at.
+    for box in (
+        [[1200, -300, -300], [1500, 300, 300]],
+        [[-3000] * 3, [3000, 3000, -1200]],
+        [[310, -790, 1001], [330, -760, 1009]],
+    ):
+        assert covered(maps, box)
+    for box in ([[1000, -300, -300], [1500, 300, 300]], [[-100, -100, -100], [100, 100, 100]], [[313, -778, 910]] * 2):
+        assert not covered(maps, box)
+    assert not covered(maps, [[-3000] * 3, [3000] * 3]), "the box holds the viewpoint"
+
+
+def test_a_wall_hides_what_is_behind_it_and_not_beside():
+    maps = coverage([10.5, 20.5, 30.5], [rectangle(0, 1000, (-900, -900), (900, 900))], resolution=64)
+    assert covered(maps, [[1050, -500, -500], [1800, 500, 500]])
+    for box in ([[900, -500, -500], [1800, 500, 500]], [[1050, -500, -500], [1800, 4500, 500]], [[-9] * 3, [-1] * 3]):
+        assert not covered(maps, box)
+
+
+def test_the_nearest_of_overlapping_polygons_stays():
+    far, near = (rectangle(2, -k, (-4100, -4100), (4100, 4100)) for k in (4000, 2000))
+    one, other = (coverage(np.zeros(3), both, resolution=16) for both in ([far, near], [near, far]))
+    np.testing.assert_array_equal(one.depth(0), other.depth(0))
+    assert 1999 < one.depth(0)[5].max() < 2001
+
+
+@pytest.mark.parametrize(
+    "polygon",
+    [
+        rectangle(0, 7, (100, 100), (900, 900)),
+        np.array([[100.0, 100, 100], [200, 200, 200], [300, 300, 300]]),
+        np.array([[107.0, 5, 5]] * 4),
+    ],
+    ids=["viewpoint in its plane", "a line through the viewpoint", "a point"],
+)
+def test_what_has_no_extent_covers_nothing(polygon):
+    maps = coverage([7.0, 0, 0], [polygon], resolution=16)
+    assert not np.isfinite(maps.depth(0)).any()
+
+
+def test_a_repeated_corner_changes_nothing():
+    polygon = rectangle(1, 900, (-4000, -300), (4000, 5000))
+    twice = polygon[[0, 1, 1, 2, 3, 3, 3]]
+    one, two = (coverage([1.5, 2.5, 3.5], [corners], resolution=32).depth(0) for corners in (polygon, twice))
+    np.testing.assert_array_equal(one, two)
+    assert np.isfinite(one).sum() > 500
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_hidden_boxes_are_hidden_exactly(seed):
+    rng = np.random.default_rng(seed)
+    viewpoint = rng.uniform(-150, 150, 3)
+    polygons = random_polygons(rng, 10)
+    maps = coverage(viewpoint, polygons, resolution=4)
+    low = rng.integers(-6000, 6000, (400, 3))
+    boxes = np.stack([low, low + rng.integers(0, 2500, (400, 3))], axis=1)
+    hidden = launch_occludees(maps, boxes, np.column_stack([np.arange(400), np.zeros(400, int)]))
+    # As many of each kind; the exact answer takes long.
+    chosen = np.concatenate([np.flatnonzero(hidden == verdict)[:3] for verdict in (0, 1)])
+    for box, verdict in zip(boxes[chosen], hidden[chosen], strict=True):
+        assert bool(verdict) == covers_box(viewpoint, polygons, box, 4), box.tolist()
+
+
+def test_touched_pixels_hold_every_point_of_the_box():
+    """The twin's own check: each sample of the box falls into a touched pixel, not nearer than its depth."""
+    rng = np.random.default_rng(5)
+    for _ in range(3):
+        low = rng.integers(-3000, 3000, 3)
+        box = np.stack([low, low + rng.integers(10, 3000, 3)])
+        viewpoint = box[1] + rng.uniform(-1, 1, 3) * (box[1] - box[0]) + [0, 0, 5000]
+        images = [touched_pixels(viewpoint, box, face, SIZE) for face in range(6)]
+        for point in rng.uniform(box[0], box[1], (100, 3)) - viewpoint:
+            axis = int(np.argmax(np.abs(point)))
+            depth = abs(point[axis])
+            pixel, row = ((point[[(axis + 1) % 3, (axis + 2) % 3]] / depth + 1) * SIZE / 2).astype(int)
+            least = images[2 * axis + (point[axis] < 0)][row][pixel]
+            assert least is not None
+            assert float(least) <= depth * (1 + 1e-9)
+
+
+def first_hits(viewpoint, directions, polygons):
+    """Least parameter t of each ray viewpoint + t * direction among the polygons, inf if it meets none."""
+    best = np.full(len(directions), np.inf)
+    for corners in polygons:
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = normal @ (corners[0] - viewpoint) / (directions @ normal)
+        hit = viewpoint + np.where(np.isfinite(t), t, 0)[:, None] * directions
+        sides = np.roll(corners, -1, axis=0) - corners
+        turns = np.stack([np.cross(side, hit - corner) @ normal for side, corner in zip(sides, corners, strict=True)])
+        good = np.isfinite(t) & (t > 0) & (turns > 0).all(axis=0)
+        best[good] = np.minimum(best[good], t[good])
+    return best
+
+
+def test_rays_in_covered_pixels_of_a_large_map_hit():
+    rng = np.random.default_rng(11)
+    viewpoint, polygons = rng.uniform(-150, 150, 3), random_polygons(rng, 150)
+    depth = coverage(viewpoint, polygons, resolution=128).depth(0)
+    face, row, pixel = np.nonzero(np.isfinite(depth))
+    assert len(face) > 50_000
+    chosen = rng.integers(0, len(face), 10_000)
+    face, row, pixel = face[chosen], row[chosen], pixel[chosen]
+    axis, count = face // 2, np.arange(len(face))
+    directions = np.empty((len(face), 3))
+    directions[count, axis] = 1 - 2.0 * (face % 2)
+    for shift, index in ((1, pixel), (2, row)):
+        directions[count, (axis + shift) % 3] = (index + rng.uniform(0.001, 0.999, len(face))) / 64 - 1
+    assert (first_hits(viewpoint, directions, polygons) <= depth[face, row, pixel]).all()
+
+
+def test_points_of_hidden_boxes_lie_behind_a_polygon():
+    rng = np.random.default_rng(12)
+    viewpoint, polygons = rng.uniform(-150, 150, 3), random_polygons(rng, 20)
+    maps = coverage(viewpoint, polygons, resolution=256)
+    low = rng.integers(-9000, 9000, (3000, 3))
+    boxes = np.stack([low, low + rng.integers(1, 1500, (3000, 3))], axis=1)
+    hidden = launch_occludees(maps, boxes, np.column_stack([np.arange(3000), np.zeros(3000, int)])) == 1
+    assert 300 < hidden.sum() < 2900
+    boxes = boxes[hidden]
+    for points in rng.uniform(boxes[:, 0], boxes[:, 1], (20, len(boxes), 3)):
+        assert (first_hits(viewpoint, points - viewpoint, polygons) < 1).all()
+
+
+def test_batches_and_threads_change_nothing():
+    rng = np.random.default_rng(3)
+    viewpoints, polygons = rng.uniform(-150, 150, (5, 3)), random_polygons(rng, 60)
+    owners = rng.integers(0, 4, 60)
+    one, two = (coverage(viewpoints, polygons, owners, resolution=512, threads=threads) for threads in (1, 2))
+    for index in range(5):
+        mine = [polygon for polygon, owner in zip(polygons, owners, strict=True) if owner == index]
+        alone = coverage(viewpoints[index], mine, resolution=512).depth(0)
+        np.testing.assert_array_equal(one.depth(index), alone)
+        np.testing.assert_array_equal(two.depth(index), alone)
+    assert not np.isfinite(one.depth(4)).any(), "the last map has no polygon"
+    low = rng.integers(-6000, 6000, (2000, 3))
+    boxes = np.stack([low, low + rng.integers(1, 800, (2000, 3))], axis=1)
+    rows = np.column_stack([np.arange(2000), rng.integers(0, 5, 2000)])
+    answers = launch_occludees(one, boxes, rows)
+    np.testing.assert_array_equal(answers, launch_occludees(two, boxes, rows, threads=2))
+    assert 50 < answers.sum() < 1950
+    assert not answers[rows[:, 1] == 4].any()
+
+
+TRIANGLE = np.array([[900.0, 0, 0], [900, 500, 0], [900, 0, 500]])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"viewpoints": np.zeros(3)}, "shape"),
+        ({"corners": TRIANGLE * np.nan}, "finite"),
+        ({"starts": [0, 2]}, "starts"),
+        ({"starts": [0, 2, 3], "owners": [0, 0]}, "at least 3 corners"),
+        ({"owners": [1]}, "maps 0 to 0"),
+        ({"resolution": 100}, "power of two"),
+    ],
+)
+def test_bad_polygons_are_refused(change, message):
+    given = {"viewpoints": np.zeros((1, 3)), "corners": TRIANGLE, "starts": [0, 3], "owners": [0], **change}
+    with pytest.raises(InputError, match=message):
+        launch_coverage(**given)
+
+
+@pytest.mark.parametrize(
+    ("boxes", "rows", "message"),
+    [
+        (np.zeros((1, 3), int), [[0, 0]], "shapes"),
+        (np.zeros((1, 2, 3), int), [[1, 0]], "below"),
+        (np.zeros((1, 2, 3), int), [[0, -1]], "below"),
+    ],
+)
+def test_bad_boxes_are_refused(boxes, rows, message):
+    with pytest.raises(InputError, match=message):
+        launch_occludees(coverage(np.zeros(3), [TRIANGLE], resolution=16), boxes, rows)

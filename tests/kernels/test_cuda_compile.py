@@ -1,0 +1,30 @@
+import importlib
+
+import pytest
+import warp as wp
+
+MODULES = (
+    "flood",
+    "target",
+    "line_tree",
+    "sightline",
+    "trace",
+    "shaft",
+    "stab_batch",
+    "coverage",
+    "occludee",
+    "backface",
+    "select",
+    "shadow",
+    "raster",
+    "deviation",
+)
+HOPPER = 90
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MODULES)
+def test_kernels_compile_for_cuda_without_a_gpu(name, tmp_path):
+    module = importlib.import_module(f"viewcell.kernels.{name}")
+    wp.compile_aot_module(module, device=None, arch=HOPPER, module_dir=str(tmp_path))
+    assert any(path.suffix in (".ptx", ".cubin") and path.stat().st_size > 1000 for path in tmp_path.rglob("*"))

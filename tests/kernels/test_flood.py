@@ -1,0 +1,203 @@
+"""Portal-sequence flood and target search against an exact search in plain Python, on random and shared graphs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import random_buildings
+from builders.places import SHARED
+from viewcell.data.graph import OTHER_AXES
+from viewcell.data.store.graph_folder import read_graph
+from viewcell.kernels import flood
+from viewcell.kernels.flood import launch_flood
+from viewcell.kernels.target import TargetAnswers, launch_target_search
+from viewcell.solvers.visibility import engine as engines
+from viewcell.solvers.visibility.cells import accept, join_rows, segments
+from viewcell.solvers.visibility.engine import Engine
+from viewcell.verify.exact.sightline import Sight, Sightlines
+
+GRAPHS = SHARED / "graphs"
+HIDDEN, VISIBLE, UNKNOWN = range(3)
+CAP = 1_000_000
+
+
+def shared_graph(name):
+    if not (GRAPHS / name).is_dir():
+        pytest.skip(f"needs {name} of the shared graphs folder")
+    return read_graph(GRAPHS / name)[0]
+
+
+def model_of(graph):
+    return Engine(None, graph, None, seed=0, threads=1, device="cpu").model
+
+
+def flooded(model, sources=None, **options):
+    """Reached cells of each source, bool, and the answers."""
+    sources = np.arange(model.graph.cell_count) if sources is None else sources
+    found = launch_flood(model.device_graph, sources, cap=options.pop("cap", CAP), **options)
+    reached = np.zeros((len(sources), model.graph.cell_count), bool)
+    reached[np.arange(len(sources)), sources] = True
+    reached[found.pairs[:, 0], found.pairs[:, 1]] = True
+    return reached, found
+
+
+def searched(model, sources=None, cap=CAP):
+    """Target search for every source and target but itself: rows and answers."""
+    cells = np.arange(model.graph.cell_count)
+    sources = cells if sources is None else sources
+    pairs = np.stack(np.meshgrid(sources, cells, indexing="ij"), axis=-1).reshape(-1, 2)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    rows = np.column_stack([pairs, np.zeros(len(pairs), int)])
+    return rows, launch_target_search(model.tree, model.graph.cells, rows, cap=cap)
+
+
+def check_pairs(model, truth, sources=None, walls=None):
+    """Both kernels reach exactly the true cells of each source, and no witness of theirs touches a wall.
+
+    Returns the number of lines and of those that are witnesses; a line through the seam of two portals, or a hair's
+    breadth from an edge, keeps its verdict but is none.
+    """
+    sources = np.arange(model.graph.cell_count) if sources is None else sources
+    reached, found = flooded(model, sources)
+    assert found.complete.all() and not found.undecided.any()
+    np.testing.assert_array_equal(reached, truth, "flood")
+    rows, answers = searched(model, sources)
+    assert (answers.verdict != UNKNOWN).all()
+    index = np.full(model.graph.cell_count, -1)
+    index[sources] = np.arange(len(sources))
+    np.testing.assert_array_equal(answers.verdict == VISIBLE, truth[index[rows[:, 0]], rows[:, 1]], "target search")
+    seen = np.flatnonzero(answers.verdict == VISIBLE)
+    others = np.flatnonzero(found.pairs[:, 1] != sources[found.pairs[:, 0]])
+    lines = TargetAnswers(None, None, found.pairs[:, 2], found.line, found.offset)
+    pairs = np.column_stack([sources[found.pairs[:, 0]], found.pairs[:, 1]])[others]
+    held = []
+    for taken, source, target, at in ((lines, *pairs.T, others), (answers, *rows[seen, :2].T, seen)):
+        origin, end = segments(taken, at, model.graph.cells[source], model.graph.cells[target])
+        held.append(accept(model, source, target, origin, end))
+        if walls is not None:
+            assert (walls.check(origin, end)[held[-1]] == Sight.CLEAR).all()
+    return sum(map(len, held)), sum(x.sum() for x in held)
+
+
+def random_building(seed):
+    """Model, truth and walls of a random building."""
+    graph, opaque = random_buildings.random_graph(seed, walls=3 + seed % 3)
+    walls = [
+        (axis, box[0, axis], *box[:, OTHER_AXES[axis]].T.ravel()) for axis in range(3) for box in opaque.boxes[axis]
+    ]
+    return (
+        model_of(graph),
+        random_buildings.reached_matrix(graph),
+        Sightlines(random_buildings.rectangle_triangles(walls, 1)),
+    )
+
+
+def check_random(seeds):
+    lines, witnesses, shares = 0, 0, []
+    for seed in seeds:
+        model, truth, walls = random_building(seed)
+        total, held = check_pairs(model, truth, walls=walls)
+        lines, witnesses = lines + total, witnesses + held
+        shares.append(truth.mean())
+    print(f"{lines} lines, {witnesses} of them witnesses; {100 * np.mean(shares):.1f} % of the pairs are visible")
+    assert witnesses > 0.97 * lines
+    # No walk-over: some buildings hide much.
+    assert min(shares) < 0.75 and np.mean(shares) < 0.95
+
+
+def test_random_buildings():
+    check_random(range(30))
+
+
+@pytest.mark.slow
+def test_more_random_buildings():
+    check_random(range(1000, 1400))
+
+
+def test_shared_building():
+    graph = shared_graph("w48")
+    sources = np.arange(5, graph.cell_count, 12)
+    truth = np.zeros((len(sources), graph.cell_count), bool)
+    for row, source in enumerate(sources):
+        truth[row, list(random_buildings.reached_cells(graph, int(source)))] = True
+    lines, witnesses = check_pairs(model_of(graph), truth, sources)
+    assert witnesses > 0.99 * lines
+
+
+@pytest.mark.parametrize(
+    ("name", "mean"),
+    [("w48", 38.43), ("l50", 175.20), ("w300", 66.29), pytest.param("w1500", 74.57, marks=pytest.mark.slow)],
+)
+def test_published_means(name, mean):
+    graph = shared_graph(name)
+    engine = Engine(None, graph, None, seed=0, threads=2, device="cpu")
+    rows = engine.join([engine.visible(np.arange(graph.cell_count))])[0]
+    assert round(len(rows.source) / graph.cell_count, 2) == mean
+    assert rows.seen.mean() > 0.999
+    key = rows.source.astype(np.int64) * graph.cell_count + rows.target
+    mirrored = np.sort(rows.target.astype(np.int64) * graph.cell_count + rows.source)
+    np.testing.assert_array_equal(key, mirrored, "A sees B exactly when B sees A")
+
+
+def test_a_search_that_is_cut_off_claims_nothing():
+    model = model_of(shared_graph("w48"))
+    truth, _ = flooded(model)
+    reached, found = flooded(model, cap=40)
+    assert not found.complete.all() and found.complete.any()
+    assert (reached <= truth).all()
+    np.testing.assert_array_equal(reached[found.complete], truth[found.complete])
+    rows, answers = searched(model, cap=1)
+    assert (answers.verdict == UNKNOWN).any()
+    visible = truth[rows[:, 0], rows[:, 1]]
+    assert not (visible & (answers.verdict == HIDDEN)).any(), "wrong-hidden"
+    assert not (~visible & (answers.verdict == VISIBLE)).any(), "wrong-visible"
+
+
+@pytest.mark.parametrize("cap", [1, 20, 100_000])
+def test_rows_do_not_depend_on_the_cap(cap, monkeypatch):
+    graph = shared_graph("w48")
+
+    def rows():
+        engine = Engine(None, graph, None, seed=0, threads=1, device="cpu")
+        joined = engine.join([engine.visible(np.arange(graph.cell_count))])[0]
+        return joined.source, joined.target, joined.seen
+
+    expected = rows()
+    monkeypatch.setattr(engines, "launch_flood", lambda *args, **kwargs: launch_flood(*args, **(kwargs | {"cap": cap})))
+    for got, wanted in zip(rows(), expected, strict=True):
+        np.testing.assert_array_equal(got, wanted)
+
+
+def test_threads_and_chunks_change_nothing(monkeypatch):
+    model = model_of(shared_graph("w48"))
+    _, one = flooded(model)
+    _, two = flooded(model, threads=2)
+    monkeypatch.setattr(flood, "CHUNK", 7)
+    _, chunked = flooded(model, threads=2)
+    for other in (two, chunked):
+        for name in one.__dataclass_fields__:
+            np.testing.assert_array_equal(getattr(other, name), getattr(one, name), err_msg=name)
+
+
+def test_joined_rows_are_symmetric():
+    """What one side hides is hidden from the other too, and one witness serves both sides."""
+    graph, _ = random_buildings.random_graph(0, walls=4)
+    engine = Engine(None, graph, None, seed=0, threads=1, device="cpu")
+    part = engine.visible(np.arange(graph.cell_count)).cells
+    pairs = np.column_stack([part.source, part.target])
+    others = np.flatnonzero((part.source != part.target) & part.seen)
+    hidden, unseen = pairs[others[0]].tolist(), pairs[others[-1]].tolist()
+    row = int(others[-1])
+    part.seen[row] = False
+    keep = ~(pairs == hidden).all(axis=1)
+    names = ("source", "target", "seen", "origin", "end", "portal_counts")
+    rows = join_rows(engine.model, [replace(part, **{name: getattr(part, name)[keep] for name in names})])
+    joined = list(zip(rows.source.tolist(), rows.target.tolist(), strict=True))
+    assert tuple(hidden) not in joined and tuple(hidden[::-1]) not in joined
+    assert len(joined) == len(pairs) - 2
+    place, back = joined.index(tuple(unseen)), int(np.flatnonzero((pairs == unseen[::-1]).all(axis=1))[0])
+    assert rows.seen[place]
+    np.testing.assert_array_equal(rows.origin[place], part.end[back])
+    np.testing.assert_array_equal(rows.end[place], part.origin[back])
+    portals = rows.portals[rows.portal_starts[place] : rows.portal_starts[place + 1]]
+    assert (graph.portal_cells[portals[0]] == unseen[0]).any() and (graph.portal_cells[portals[-1]] == unseen[1]).any()

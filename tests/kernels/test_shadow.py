@@ -1,0 +1,369 @@
+"""Umbras, shrunk occluders and grown holes: published vectors, and every claim against rationals."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from builders import outlines
+from builders.outlines import area_of, outline_table, random_scene
+from builders.places import HARD_CASES
+from viewcell.data.errors import InputError
+from viewcell.data.patches import find_patches
+from viewcell.kernels.shadow import BENT, STRADDLES, TOUCHES, USABLE, launch_grow_hole, launch_shrink, launch_umbra
+from viewcell.verify.arithmetic import MISS, crossing_kind
+from viewcell.verify.exact.shadow import (
+    along,
+    box_corners,
+    dot,
+    grown_hole,
+    hides,
+    in_hull,
+    load_shadow_cases,
+    minus,
+    occluder,
+    rational,
+    recession,
+    shrunk,
+    umbra,
+    winds,
+)
+
+CASES = {c.name: c for c in load_shadow_cases(HARD_CASES / "shadow.txt")}
+
+
+def points_behind(rng, exact, count):
+    """Random points around the cone that the cell and the outline span, many near the umbra's border."""
+    outline = np.array(exact.outline, float)
+    cell = np.array(exact.cell, float)
+    weights = rng.dirichlet(np.full(len(outline), 0.4), count)
+    eyes = cell[rng.integers(0, 8, count)] * 0.7 + cell.mean(axis=0) * 0.3
+    through = weights @ outline
+    through = outline.mean(axis=0) + (through - outline.mean(axis=0)) * rng.choice([0.6, 0.95, 1.0, 1.3], (count, 1))
+    x = through + (through - eyes) * rng.choice([0.001, 0.1, 1.0, 7.0], (count, 1)) * rng.random((count, 1))
+    return np.round(x * 64) / 64
+
+
+def check_umbra(seed, scenes, per_scene):
+    """Kernel against twin against the definition; returns how many points were hidden and how many were not."""
+    rng, hidden, seen = np.random.default_rng(seed), 0, 0
+    for _ in range(scenes):
+        cell, outline, exact = random_scene(rng)
+        umbras = launch_umbra(cell[None], outline_table([outline]), [[0, 0]])
+        planes = exact.planes
+        if any(exact.depth(p) == 0 for p in exact.cell) and sum(c != 0 for c in exact.normal) > 1:
+            assert umbras.status[0] == STRADDLES, "float64 cannot tell a touch of an oblique plane"
+            continue
+        assert umbras.status[0] == (TOUCHES if planes is None else USABLE)
+        points = points_behind(rng, exact, per_scene)
+        inside = umbras.contains(0, points)
+        for point, held in zip(rational(points.tolist()), inside, strict=True):
+            truth = hides(exact, point)
+            assert umbra(exact, point) == truth
+            assert truth or not held, f"wrong-hidden: {point} behind {outline.tolist()} from {cell.tolist()}"
+            if truth and not held:
+                # Only what is within 2e-5 grid steps of a plane may be given away.
+                near = [(exact.normal, exact.offset), *planes]
+                assert min((dot(m, point) - c) ** 2 / dot(m, m) for m, c in near) < Fraction(1, 2500000000)
+            hidden, seen = hidden + truth, seen + (not truth)
+    return hidden, seen
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_published_vectors(name):
+    case = CASES[name]
+    exact = occluder(case.cell, case.outline)
+    table = outline_table([case.outline])
+    umbras = launch_umbra(np.array([case.cell]), table, [[0, 0]])
+    corners = box_corners(case.box)
+    assert all(umbra(exact, x) for x in corners) == all(hides(exact, x) for x in corners)
+    assert all(umbra(exact, x) for x in corners) == (case.expected in ("hidden", "touch"))
+    assert umbras.contains(0, np.array(corners, float)).all() == (case.expected == "hidden")
+    if case.rho is None:
+        assert umbras.status[0] == STRADDLES and exact.straddles
+        return
+    assert umbras.status[0] == (TOUCHES if -np.inf in case.rho else USABLE)
+    wanted = rho_of_edges(exact)
+    for edge, rho in zip((0, 2), case.rho, strict=True):
+        assert wanted[edge_name(*case.outline[edge : edge + 2])] == pytest.approx(rho, abs=5e-5)
+    if umbras.status[0] == USABLE:
+        got = zip(table.corners, np.roll(table.corners, -1, axis=0), umbras.rho, strict=True)
+        assert {edge_name(a, b): pytest.approx(rho) for a, b, rho in got} == wanted
+
+
+def edge_name(a, b):
+    return frozenset(tuple(int(c) for c in end) for end in (a, b))
+
+
+def rho_of_edges(exact):
+    """Exact rho by edge, in units of length over length."""
+    ends = zip(exact.outline, exact.outline[1:] + exact.outline[:1], recession(exact), strict=True)
+    return {
+        edge_name(a, b): -np.inf if rho is None else float(rho) / float(dot(minus(b, a), minus(b, a))) ** 0.5
+        for a, b, rho in ends
+    }
+
+
+def test_umbra_is_the_definition():
+    hidden, seen = check_umbra(1, 40, 20)
+    assert hidden > 150 and seen > 150
+
+
+@pytest.mark.slow
+def test_umbra_is_the_definition_many():
+    hidden, seen = check_umbra(2, 500, 55)
+    assert hidden > 5000 and seen > 5000
+
+
+def check_eyes(seed, scenes):
+    """Points that the kernel calls hidden behind flat and bent discs, from random eyes; returns how many."""
+    rng, held = np.random.default_rng(seed), 0
+    for scene in range(scenes):
+        if scene % 2:
+            triangles, size = outlines.random_disc(rng)
+            patches = find_patches(
+                triangles, np.zeros(len(triangles)), least_area=1.0, most_corners=12, cos_limit=0.5, axial=True
+            )
+            if len(patches.area) != 1:
+                continue
+            away = patches.normal[0] * rng.choice([-1, 1])
+            low = np.round(triangles.mean(axis=(0, 1)) - away * size * rng.uniform(0.2, 5)).astype(int)
+            cell = np.stack([low, low + rng.integers(1, 2 + size // 2, 3)])
+            outline = patches.corners
+        else:
+            cell, outline, _ = random_scene(rng)
+            patches = outline_table([outline])
+            fan = [outline[[0, i, i + 1]] for i in range(1, len(outline) - 1)]
+            triangles = np.array(fan)
+        umbras = launch_umbra(cell[None], patches, [[0, 0]])
+        if umbras.status[0] != USABLE:
+            continue
+        weights = rng.dirichlet(np.ones(len(outline)), 20)
+        behind = weights @ outline
+        points = behind + (behind - cell.mean(axis=0)) * rng.uniform(0.01, 3, (20, 1))
+        for point in points[umbras.contains(0, points)][:6]:
+            held += 1
+            eye = cell[0] + rng.integers(0, 17, 3) * (cell[1] - cell[0]) / 16
+            assert any(crossing_kind(eye, point, t) != MISS for t in triangles), f"{eye} sees {point}"
+    return held
+
+
+def test_no_eye_in_the_cell_sees_into_the_umbra():
+    assert check_eyes(3, 120) > 150
+
+
+@pytest.mark.slow
+def test_no_eye_in_the_cell_sees_into_the_umbra_many():
+    assert check_eyes(4, 6000) > 10_000
+
+
+def bent_quadrilateral(height):
+    triangles = outlines.surface(1, 1, lambda u, v: (u * 100, v * 100, height * u * v))
+    return find_patches(triangles, np.zeros(2), least_area=1.0, cos_limit=0.2, axial=True)
+
+
+def bent_scenes():
+    """Bent outlines and cells; in the last the separating planes bind."""
+    bent = bent_quadrilateral(60)
+    for side in (-1, 1):
+        middle = np.round(bent.boxes[0].mean(axis=0) + side * bent.normal[0] * 90).astype(int)
+        yield bent, np.stack([middle - 12, middle + 12])
+    a, b, c, d = [[-38, 86, 35], [97, 23, -74], [30, 39, 60], [-78, 63, 72]]
+    steep = find_patches(np.array([[a, b, c], [a, c, d]]), np.zeros(2), least_area=1.0, cos_limit=0.05, axial=True)
+    yield steep, np.array([[14, 88, -1], [19, 91, 6]])
+
+
+@pytest.mark.parametrize("scene", range(3))
+def test_the_umbra_of_a_bent_outline_is_where_it_winds_round_every_line(scene):
+    rng, held = np.random.default_rng(11), np.zeros(2, int)
+    bent, cell = list(bent_scenes())[scene]
+    assert np.diff(bent.starts).tolist() == [4]
+    umbras = launch_umbra(cell[None], bent, [[0, 0]])
+    assert umbras.status[0] == USABLE
+    away = umbras.normal[0]
+    points = rng.normal(size=(800, 3)) * rng.choice([30, 300, 3000], (800, 1))
+    points += away * (umbras.far[0] + 0.01 + rng.exponential(30, (800, 1)) - points @ away[:, None])
+    for point, inside in zip(points, umbras.contains(0, points), strict=True):
+        truth = winds(cell.tolist(), bent.corners.tolist(), rational([point])[0])
+        assert inside == truth or (truth and not umbras.contains(0, point[None] + away * 1e-3)[0])
+        held[int(inside)] += 1
+    assert held.min() > 30
+
+
+def test_a_touching_cell_has_an_umbra_only_where_the_outline_covers_the_contact():
+    rng, seen = np.random.default_rng(12), set()
+    for _ in range(150):
+        axis, side = rng.integers(0, 3), rng.integers(0, 2)
+        cell = np.stack([low := rng.integers(-9, 9, 3), low + rng.integers(1, 6, 3)])
+        uv = [i for i in range(3) if i != axis]
+        outline = np.full((4, 3), cell[side, axis])
+        ends = np.stack([cell[0] - rng.integers(-3, 4, 3), cell[1] + rng.integers(-1, 4, 3)])
+        if (ends[0] >= ends[1]).any():
+            continue
+        outline[:, uv] = [(ends[i, uv[0]], ends[j, uv[1]]) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        exact = occluder(cell.tolist(), outline.tolist())
+        status = launch_umbra(cell[None], outline_table([outline]), [[0, 0]]).status[0]
+        assert status == (TOUCHES if exact.planes is None else USABLE)
+        seen.add(int(status))
+    assert seen == {TOUCHES, USABLE}
+
+
+def project(exact, point):
+    """The point moved onto the plane of the outline along its normal, exactly."""
+    return along(point, -exact.depth(point) / dot(exact.normal, exact.normal), exact.normal)
+
+
+def polygons_of(polygons):
+    return [polygons.corners[a:b] for a, b in zip(polygons.starts[:-1], polygons.starts[1:], strict=True)]
+
+
+def random_point_before(rng, cell, exact):
+    """A projection point: inside the cell, or somewhere else in front of the plane; in sixteenths of a grid step."""
+    middle, spread = cell.mean(axis=0), np.ptp(cell, axis=0)
+    reach = rng.choice([0.4, 0.4, 3.0])
+    point = np.round((middle + rng.uniform(-reach, reach, 3) * spread) * 16) / 16
+    height = -exact.depth(rational([point])[0])
+    return point if height > 0 and height * height > dot(exact.normal, exact.normal) else middle
+
+
+def check_shrunk(seed, scenes, limited, shrink=True):
+    """Points behind shrunk occluders against the exact umbra; returns how many points were in it and how many not."""
+    rng, inside, outside = np.random.default_rng(seed), 0, 0
+    for _ in range(scenes):
+        cell, outline, exact = random_scene(rng)
+        point = random_point_before(rng, cell, exact)
+        v = rational([point])[0]
+        unit = float(dot(exact.normal, exact.normal)) ** 0.5
+        height = float(-exact.depth(v)) / unit
+        depth = height * rng.uniform(0.05, 4) if limited else np.inf
+        umbras = launch_umbra(cell[None], outline_table([outline]), [[0, 0]])
+        corners = polygons_of(launch_shrink(umbras, [0], [point], [depth]))[0] if shrink else outline
+        if shrink:
+            wanted = shrunk(exact, v, Fraction(depth * unit) if limited else None)
+            share = area_of(corners) / area_of(outline) if len(corners) else 0.0
+            assert share == pytest.approx(area_of(wanted) / area_of(outline) if len(wanted) > 2 else 0.0, abs=1e-2)
+        for _ in range(3 if len(corners) else 0):
+            q = rational([rng.dirichlet(np.full(len(corners), 0.3)) @ corners])[0]
+            share = Fraction(rng.uniform(0.02, 0.999))
+            s = share * Fraction(depth / height) if limited else Fraction(float(rng.choice([0.1, 3.0, 500.0]))) * share
+            truth = umbra(exact, along(q, s, minus(q, v)))
+            inside, outside = inside + truth, outside + (not truth)
+    return inside, outside
+
+
+@pytest.mark.parametrize("limited", [False, True])
+def test_what_a_shrunk_occluder_hides_is_in_the_umbra(limited):
+    inside, outside = check_shrunk(5, 150, limited)
+    assert outside == 0 and inside > 100
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("limited", [False, True])
+def test_what_a_shrunk_occluder_hides_is_in_the_umbra_many(limited):
+    inside, outside = check_shrunk(6, 6000, limited)
+    assert outside == 0 and inside > 4000
+
+
+def test_an_unshrunk_occluder_hides_more_than_the_umbra():
+    inside, outside = check_shrunk(7, 60, False, shrink=False)
+    assert outside > inside
+
+
+def check_holes(seed, scenes):
+    """Points seen through holes against grown holes, exact and of the kernel; returns how many."""
+    rng, checked = np.random.default_rng(seed), 0
+    for _ in range(scenes):
+        cell, outline, exact = random_scene(rng)
+        point = random_point_before(rng, cell, exact)
+        v = rational([point])[0]
+        status, polygons = launch_grow_hole(cell[None], outline_table([outline]), [[0, 0]], [point])
+        gap = -max(exact.depth(p) for p in exact.cell)
+        if status[0] != USABLE:
+            assert gap * gap < Fraction(1001, 1000) * dot(exact.normal, exact.normal), "refused though a step away"
+            assert polygons.starts.tolist() == [0, 0]
+            continue
+        hull, kernel = grown_hole(exact, v), [project(exact, q) for q in rational(polygons.corners)]
+        low, high = rational(cell.tolist())
+        for _ in range(4):
+            weights = rational([rng.integers(0, 9, len(outline)).tolist()])[0]
+            if not any(weights):
+                continue
+            w = [dot(weights, column) / sum(weights) for column in zip(*exact.outline, strict=True)]
+            share = rational([(rng.integers(0, 17, 3) / 16).tolist()])[0]
+            eye = [a + k * (b - a) for a, b, k in zip(low, high, share, strict=True)]
+            x = along(w, Fraction(int(rng.integers(0, 4000)), 64), minus(w, eye))
+            crossing = along(v, -exact.depth(v) / (exact.depth(x) - exact.depth(v)), minus(x, v))
+            assert in_hull(hull, exact.normal, crossing)
+            assert in_hull(kernel, exact.normal, crossing)
+            checked += 1
+    return checked
+
+
+def test_what_is_seen_through_a_hole_is_behind_the_grown_hole():
+    assert check_holes(8, 80) > 200
+
+
+@pytest.mark.slow
+def test_what_is_seen_through_a_hole_is_behind_the_grown_hole_many():
+    assert check_holes(9, 4000) > 10_000
+
+
+def test_a_grown_axial_hole_is_the_hull_of_its_corners():
+    cell, hole = np.array([[0, 0, 0], [10, 10, 10]]), [[30, 2, 3], [30, 9, 3], [30, 9, 8], [30, 2, 8]]
+    _, polygons = launch_grow_hole(cell[None], outline_table([hole]), [[0, 0]], [[5.0, 5.0, 5.0]])
+    points = np.array(grown_hole(occluder(cell.tolist(), hole), [Fraction(5)] * 3), float)
+    np.testing.assert_allclose(polygons.corners.min(axis=0), points.min(axis=0), atol=1e-3)
+    np.testing.assert_allclose(polygons.corners.max(axis=0), points.max(axis=0), atol=1e-3)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_hole_seen_from_far_away_hardly_grows(side):
+    hole = np.array([[30, 0, 300], [30, 9000, 1300], [30, 4000, 7800]])
+    low = np.array([30 + side * 90_000, 40, 40])
+    _, polygons = launch_grow_hole([[low, low + 1]], outline_table([hole]), [[0, 0]], [low + 0.5])
+    assert area_of(hole) < area_of(polygons.corners) < 1.001 * area_of(hole)
+
+
+def test_bent_outlines_and_points_behind_leave_nothing():
+    bent = bent_quadrilateral(60)
+    cut, before = [[40, 40, 0], [60, 60, 20]], [[0, 0, -99], [9, 9, -90]]
+    round_an_edge = [[95, -105, -65], [105, -95, -55]]
+    umbras = launch_umbra([cut, round_an_edge, before], bent, [[0, 0], [1, 0], [2, 0]])
+    assert umbras.status.tolist() == [STRADDLES, BENT, USABLE]
+    status, polygons = launch_grow_hole([before], bent, [[0, 0]], [[4.0, 4.0, -94.0]])
+    assert status.tolist() == [BENT] and polygons.starts.tolist() == [0, 0]
+    table = outline_table([[[30, 2, 3], [30, 9, 3], [30, 9, 8]]])
+    flat = launch_umbra([[[0, 0, 0], [1, 1, 1]]], table, [[0, 0]])
+    before, behind = launch_shrink(flat, [0, 0], [[0.5, 0.5, 0.5], [31.0, 5, 5]]).starts[1:]
+    assert before == behind > 0
+    assert not flat.contains(0, np.array([[29.0, 5, 5]]))[0]
+
+
+def test_threads_and_order_change_nothing():
+    rng = np.random.default_rng(10)
+    scenes = [random_scene(rng)[:2] for _ in range(40)]
+    boxes, table = np.array([cell for cell, _ in scenes]), outline_table([outline for _, outline in scenes])
+    pairs = np.stack(np.meshgrid(np.arange(40), np.arange(40)), axis=-1).reshape(-1, 2)
+    points = boxes[pairs[:, 0]].mean(axis=1)
+    results = []
+    for threads in (1, 2):
+        umbras = launch_umbra(boxes, table, pairs, threads=threads)
+        shrunken = launch_shrink(umbras, np.arange(len(pairs)), points, threads=threads)
+        holes = launch_grow_hole(boxes, table, pairs, points, threads=threads)[1]
+        results.append([umbras.status, umbras.planes, umbras.rho, shrunken.corners, holes.corners, holes.starts])
+    for one, two in zip(*results, strict=True):
+        np.testing.assert_array_equal(one, two)
+    last = launch_umbra(boxes, table, pairs[-1:])
+    np.testing.assert_array_equal(last.planes, umbras.planes[umbras.starts[-2] :])
+
+
+@pytest.mark.parametrize("box", [[[0, 0, 0], [1, 0, 1]], [[0, 0, 0], [1, 1, 2**24]]])
+def test_bad_cells(box):
+    with pytest.raises(InputError, match="view cell 0: expected a box with inside"):
+        launch_umbra([box], outline_table([[[30, 2, 3], [30, 9, 3], [30, 9, 8]]]), [[0, 0]])
+
+
+def test_bad_case_files(tmp_path):
+    path = tmp_path / "cases.txt"
+    path.write_text("# fine\nname; hidden; 0 0 0, 1 1 1; 2 0 0, 2 1 0; 3 0 0, 4 1 1; -; too few corners\n")
+    with pytest.raises(InputError, match=r"cases.txt, line 2: expected 'name; expected"):
+        load_shadow_cases(path)

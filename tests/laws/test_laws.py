@@ -1,0 +1,389 @@
+"""Laws that any potentially visible set obeys, on our own bakes; and each broken by a kernel broken on purpose.
+
+`seen` has witnesses and `potential` leaves out only what is proved hidden, so between two bakes of which one can see no
+less than the other, seen(less) is in potential(more); where every verdict is exact, as in bare graphs, sets are equal.
+"""
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import viewcell
+from hypothesis import HealthCheck, Phase, assume, given, settings
+from viewcell.data.graph import OTHER_AXES
+from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
+from viewcell.data.store.database import cells_table, portals_table
+from viewcell.data.verdict import Verdict
+from viewcell.kernels.stab import HIDDEN, STABBED
+from viewcell.kernels.stab_batch import launch_stab
+from viewcell.solvers.visibility import cells as cell_visibility
+from viewcell.solvers.visibility import engine
+from viewcell.solvers.visibility import occluders as occlusion
+from viewcell.verify.exact.region import region_visible
+from viewcell.verify.exact.select import best_by_milp, best_by_table
+from viewcell.verify.exact.stab import stab
+from viewcell.verify.strategies import MODULE, buildings, knapsacks, occluded_pairs, portal_sequences
+from viewcell.workbench.bake import run as workbench_bake
+from viewcell.workbench.bake.run import Settings
+
+BAKES = settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
+# A law is broken on the same examples every time, and it is enough to see that it is.
+BROKEN = settings(
+    max_examples=200,
+    database=None,
+    derandomize=True,
+    deadline=None,
+    report_multiple_bugs=False,
+    phases=[Phase.generate],
+    suppress_health_check=list(HealthCheck),
+)
+
+
+def baked(model, **options):
+    """A bake in a folder of its own, with its tables read."""
+    with tempfile.TemporaryDirectory() as folder:
+        if not isinstance(model, Scene):
+            path = Path(folder) / "graph"
+            path.mkdir()
+            pq.write_table(cells_table(model, GRID_M), path / "cells.parquet")
+            pq.write_table(portals_table(model, GRID_M), path / "portals.parquet")
+            model = path
+        if "cells" in options:
+            path = Path(folder) / "cells.parquet"
+            pq.write_table(pa.table(options["cells"]), path)
+            options["cells"] = str(path)
+        made = viewcell.bake(model, Path(folder) / "made.bake", settings=Settings(**options), threads=1)
+        _ = made.potential_objects, made.potential_cells, made.cell_to_object, made.cell_to_cell
+    return made
+
+
+def seen(made, kind="object"):
+    """Pairs with a witness, shape (cells, targets), bool."""
+    table, target = (made.cell_to_object, "object_id") if kind == "object" else (made.cell_to_cell, "reached_cell_id")
+    matrix = np.zeros_like(made.potential_objects if kind == "object" else made.potential_cells)
+    rows = np.array([verdict == "visible" for verdict in table["verdict"].to_pylist()], bool)
+    matrix[table["cell_id"].to_numpy()[rows], table[target].to_numpy()[rows]] = True
+    return matrix
+
+
+def by_occluders(building):
+    return baked(building.scene, method="occluders", cells=building.view_cells)
+
+
+def moved_graph(graph, turn):
+    """A graph whose boxes are moved by a function of corners, shape (n, 3); sides are put in order again."""
+
+    def boxes(corners):
+        ends = np.stack([turn(corners[:, 0]), turn(corners[:, 1])], axis=1)
+        return np.sort(ends, axis=1).astype(np.int32)
+
+    cells, portals = boxes(graph.cells), boxes(graph.portals)
+    axis = (portals[:, 0] == portals[:, 1]).argmax(axis=1).astype(np.int8)
+    row = np.arange(len(axis))
+    forward = cells[graph.portal_cells[:, 0], 1, axis] == portals[row, 0, axis]
+    ends = np.where(forward[:, None], graph.portal_cells, graph.portal_cells[:, ::-1])
+    return replace(graph, cells=cells, portals=portals, portal_axis=axis, portal_cells=ends)
+
+
+MOVES = {
+    "shift": lambda points: points + np.array([64, -320, 17]),
+    "mirror": lambda points: points * [-1, 1, 1],
+    "quarter turn": lambda points: points[:, [1, 0, 2]] * [-1, 1, 1],
+    "permutation": lambda points: points[:, [2, 0, 1]],
+}
+
+
+def stabs_exactly(sequence, launch):
+    """The kernel is right or withholds."""
+    truth = stab(sequence.array(), sequence.signs).verdict
+    found = launch(sequence.array()[None].astype(np.int32), np.array([sequence.signs])).verdict[0]
+    assert found != HIDDEN or truth is Verdict.HIDDEN
+    assert found != STABBED or truth is Verdict.VISIBLE
+
+
+def law_stabbing_is_exact(sequence):
+    """The kernel against its twin."""
+    stabs_exactly(sequence, launch_stab)
+
+
+def law_motion_changes_nothing(building):
+    """Shift, mirror, quarter turn and permutation of axes, on bare graphs, where what is hidden is decided exactly.
+
+    A sightline is found by aiming at random, so that of what is seen through slits of 1 grid unit each bake may
+    withhold another part; but what one of them sees is potential in all.
+    """
+    graph = building.graph()
+    assume(graph.portal_count)
+    truth = baked(graph)
+    for name, turn in MOVES.items():
+        moved = baked(moved_graph(graph, turn))
+        assert np.array_equal(moved.potential_cells, truth.potential_cells), name
+        assert not (seen(moved, "cell") & ~truth.potential_cells).any(), name
+
+
+def law_a_shift_changes_nothing(building):
+    """Of a model: the same sets to the last pair."""
+    objects = [replace(o, transform=o.transform.copy()) for o in building.scene.objects]
+    for placed in objects:
+        placed.transform[:3, 3] += np.array([64, -320, 17]) * GRID_M
+    cells = {name: list(values) for name, values in building.view_cells.items()}
+    for axis, step in zip("xyz", (64, -320, 17), strict=True):
+        for side in ("min", "max"):
+            cells[f"{side}_{axis}"] = [value + step * GRID_M for value in cells[f"{side}_{axis}"]]
+    scene = replace(building.scene, objects=objects, spaces=[])
+    truth, moved = by_occluders(building), baked(scene, method="occluders", cells=cells)
+    assert np.array_equal(truth.potential_objects, moved.potential_objects)
+
+
+def law_a_mirror_reveals_nothing(building):
+    """Of a model: what is seen in one is potential in the other."""
+    mirrored = [replace(o, transform=np.diag([-1.0, 1, 1, 1]) @ o.transform) for o in building.scene.objects]
+    shapes = [
+        Definition(d.name, tuple(Mesh(m.vertices, m.faces[:, ::-1], m.error_m) for m in d.lods))
+        for d in building.scene.definitions
+    ]
+    scene = replace(building.scene, objects=mirrored, definitions=shapes, spaces=[])
+    cells = building.view_cells | {
+        "min_x": [-value for value in building.view_cells["max_x"]],
+        "max_x": [-value for value in building.view_cells["min_x"]],
+    }
+    truth, moved = by_occluders(building), baked(scene, method="occluders", cells=cells)
+    assert not (seen(truth) & ~moved.potential_objects).any()
+    assert not (seen(moved) & ~truth.potential_objects).any()
+
+
+def law_sight_is_mutual(building):
+    """A sees B exactly when B sees A."""
+    graph = building.graph()
+    assume(graph.portal_count)
+    made = baked(graph)
+    assert np.array_equal(made.potential_cells, made.potential_cells.T)
+    assert np.array_equal(seen(made, "cell"), seen(made, "cell").T)
+
+
+def law_an_occluder_reveals_nothing(building):
+    """With a piece of furniture less, or a door less, nothing that was seen is hidden."""
+    assume(building.furniture or building.doors)
+    if building.furniture:
+        fewer = replace(building, furniture=building.furniture[:-1])
+        more, less = by_occluders(fewer), by_occluders(building)
+        kept = len(fewer.scene.objects)
+        assert not (seen(less)[:, :kept] & ~more.potential_objects).any()
+    if building.doors:
+        whole, walled = building.graph(), replace(building, doors=building.doors[:-1]).graph()
+        rooms = int(np.prod(building.rooms))
+        more, less = baked(whole).potential_cells, baked(walled).potential_cells
+        assert not (less[:rooms, :rooms] & ~more[:rooms, :rooms]).any()
+
+
+def law_cells_and_their_parts_agree(building):
+    """A smaller cell sees no more; the parts of a cell see together what the cell sees."""
+    cells = building.view_cells
+    count = len(cells["cell_id"])
+    middle = [(low + high) / 2 for low, high in zip(cells["min_x"], cells["max_x"], strict=True)]
+    parts = {name: list(values) * 2 for name, values in cells.items()} | {
+        "cell_id": list(range(2 * count)),
+        "min_x": cells["min_x"] + middle,
+        "max_x": middle + cells["max_x"],
+    }
+    whole, halves = by_occluders(building), baked(building.scene, method="occluders", cells=parts)
+    together = halves.potential_objects[:count] | halves.potential_objects[count:]
+    witnessed = seen(halves)[:count] | seen(halves)[count:]
+    assert not (seen(whole) & ~together).any()
+    assert not (witnessed & ~whole.potential_objects).any()
+
+
+def law_levels_of_detail_change_nothing(building):
+    """Coarser levels beside the finest one, however wrong, leave every verdict as it was."""
+    shapes = [
+        Definition(d.name, (*d.lods, Mesh(d.lods[0].vertices * 1.5, d.lods[0].faces[::3], 0.5)))
+        for d in building.scene.definitions
+    ]
+    truth, made = (
+        baked(scene, method="occluders", cells=building.view_cells)
+        for scene in (building.scene, replace(building.scene, definitions=shapes))
+    )
+    assert made.cell_to_object.equals(truth.cell_to_object)
+
+
+def law_polygons_hide_only_what_is_hidden(pair):
+    """A bake of polygons against the exact answer."""
+    parts = [pair.target, *pair.occluders]
+    shapes, objects = [], []
+    for number, corners in enumerate(parts):
+        mesh = Mesh(np.array(corners) * GRID_M, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+        shapes.append(Definition(f"polygon {number}", (mesh,)))
+        objects.append(Instance(f"polygon {number}", "polygon", number, np.eye(4), Role.OCCLUDER))
+    names = [f"{side}_{axis}" for side in ("min", "max") for axis in "xyz"]
+    cells = dict(zip(names, ([c * GRID_M] for corner in pair.cell for c in corner), strict=True))
+    made = baked(Scene(shapes, objects), method="occluders", cells=cells)
+    truth = region_visible(pair.cell, pair.target, pair.occluders).verdict
+    assert made.potential_objects[0, 0] or truth is not Verdict.VISIBLE
+    assert not seen(made)[0, 0] or truth is not Verdict.HIDDEN
+
+
+def spends_best(sack, solve):
+    """A selection keeps to its budget and is worth as much as the table's."""
+    best, found = best_by_table(sack.benefits, sack.costs, sack.budget), solve(sack.benefits, sack.costs, sack.budget)
+    assert (best is None) == (found is None)
+    if best is not None:
+        assert found.cost <= sack.budget and found.value == best.value
+
+
+def law_a_budget_is_spent_best(sack):
+    """The solver against the table."""
+    spends_best(sack, best_by_milp)
+
+
+LAWS = {
+    law_stabbing_is_exact: portal_sequences(),
+    law_motion_changes_nothing: buildings(columns=3, rows=2, furniture=0),
+    law_a_shift_changes_nothing: buildings(columns=2, rows=2),
+    law_a_mirror_reveals_nothing: buildings(columns=2, rows=2),
+    law_sight_is_mutual: buildings(columns=3, rows=2, storeys=2, furniture=0),
+    law_an_occluder_reveals_nothing: buildings(columns=3, rows=1),
+    law_cells_and_their_parts_agree: buildings(columns=2, rows=2),
+    law_levels_of_detail_change_nothing: buildings(columns=2, rows=1),
+    law_polygons_hide_only_what_is_hidden: occluded_pairs(size=7_900),
+    law_a_budget_is_spent_best: knapsacks(),
+}
+QUICK = {law_stabbing_is_exact: 300, law_a_budget_is_spent_best: 60, law_polygons_hide_only_what_is_hidden: 25}
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__)
+def test_law(law):
+    settings(BAKES, max_examples=QUICK.get(law, BAKES.max_examples))(given(LAWS[law])(law))()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__)
+def test_law_on_many_examples(law):
+    settings(BAKES, max_examples=10 * QUICK.get(law, 6))(given(LAWS[law])(law))()
+
+
+def epsilon_stab(boxes, signs):
+    """Boxes a step smaller on each side: an epsilon, as many bakers have one."""
+    size = boxes[:, :, 1] - boxes[:, :, 0]
+    inset = np.where(size > 2, 1, 0)
+    return launch_stab(np.stack([boxes[:, :, 0] + inset, boxes[:, :, 1] - inset], axis=2).astype(np.int32), signs)
+
+
+def forward_join(model, parts, original=cell_visibility.join_rows):
+    """Keeps the lines that lead forward only: a line was not thought of as one that can be followed back."""
+    rows = original(model, parts)
+    keep = rows.end[:, 0] >= rows.origin[:, 0]
+    lengths = np.diff(rows.portal_starts)
+    portals = rows.portals[np.repeat(keep, lengths)]
+    starts = np.concatenate([[0], np.cumsum(lengths[keep])])
+    kept = {name: getattr(rows, name)[keep] for name in ("source", "target", "seen", "origin", "end")}
+    return replace(rows, **kept, portal_starts=starts, portals=portals)
+
+
+def grown_tree(blockers, device="cpu", original=occlusion.blocker_tree, by=40):
+    """Blockers that reach further than their surface: a "conservative" rasterisation on the wrong side."""
+    boxes = blockers.boxes.copy()
+    for axis in range(3):
+        part = blockers.axis != axis
+        boxes[part, 0, axis] -= by
+        boxes[part, 1, axis] += by
+    return original(replace(blockers, boxes=boxes), device)
+
+
+def one_sided_tree(blockers, device="cpu", original=occlusion.blocker_tree):
+    """Blockers that reach too far towards larger x alone, by half a module."""
+    boxes = blockers.boxes.copy()
+    boxes[blockers.axis != 0, 1, 0] += MODULE // 2
+    return original(replace(blockers, boxes=boxes), device)
+
+
+def anchored_tree(blockers, device="cpu", original=occlusion.blocker_tree):
+    """Blockers on even planes only: an answer that depends on where the model lies."""
+    keep = blockers.boxes[np.arange(len(blockers.axis)), 0, blockers.axis] % 128 == 64
+    boxes = np.where(keep[:, None, None], blockers.boxes, 0)
+    return original(replace(blockers, boxes=boxes), device)
+
+
+def lost_remainder(tree, boxes, rows, original=occlusion.launch_target_search, **options):
+    """The last batch of eight, if it is not full, is never looked at."""
+    answers = original(tree, boxes, rows, **options)
+    verdict = answers.verdict.copy()
+    verdict[len(rows) // 8 * 8 :] = 0
+    return replace(answers, verdict=verdict)
+
+
+def half_portals(folder, original=workbench_bake.read_graph, **options):
+    """Portals of half their width: the same portal is another one in a mirror."""
+    graph, moved = original(folder, **options)
+    portals, row = graph.portals.copy(), np.arange(graph.portal_count)
+    across = OTHER_AXES[graph.portal_axis][:, 0]
+    portals[row, 1, across] -= (portals[row, 1, across] - portals[row, 0, across]) // 2
+    return replace(graph, portals=portals), moved
+
+
+def from_the_middle(tree, boxes, rows, original=occlusion.launch_target_search, **options):
+    """Looks from the middle of each view cell, as from a point."""
+    boxes = boxes.copy()
+    cells = np.unique(rows[:, 0])
+    size = boxes[cells, 1] - boxes[cells, 0]
+    boxes[cells, 0] += size * 9 // 20
+    boxes[cells, 1] -= size * 9 // 20
+    return original(tree, boxes, rows, **options)
+
+
+def coarsest_triangles(self, original=Scene.triangles):
+    """Triangles of the last level instead of the first."""
+    shapes = [replace(shape, lods=shape.lods[::-1]) for shape in self.definitions]
+    return original(replace(self, definitions=shapes))
+
+
+def greedy(benefits, costs, budget):
+    """Steps by benefit over cost of whole levels, as published; not half as good as it claims to be."""
+    choice = [int(np.argmin(group)) for group in costs]
+    spent = sum(group[k] for group, k in zip(costs, choice, strict=True))
+    if spent > budget:
+        return None
+    steps = sorted(
+        ((b - row[c]) / max(1, cost - group[c]), g, k)
+        for g, (row, group, c) in enumerate(zip(benefits, costs, choice, strict=True))
+        for k, (b, cost) in enumerate(zip(row, group, strict=True))
+    )
+    for _, g, k in reversed(steps):
+        more = costs[g][k] - costs[g][choice[g]]
+        if benefits[g][k] > benefits[g][choice[g]] and spent + more <= budget:
+            spent, choice[g] = spent + more, k
+    value = sum(row[k] for row, k in zip(benefits, choice, strict=True))
+    return type("Found", (), {"value": value, "cost": spent})
+
+
+BREAKS = {
+    law_motion_changes_nothing: (workbench_bake, "read_graph", half_portals),
+    law_a_shift_changes_nothing: (occlusion, "blocker_tree", anchored_tree),
+    law_a_mirror_reveals_nothing: (occlusion, "blocker_tree", one_sided_tree),
+    law_sight_is_mutual: (engine, "join_rows", forward_join),
+    law_an_occluder_reveals_nothing: (occlusion, "launch_target_search", lost_remainder),
+    law_cells_and_their_parts_agree: (occlusion, "launch_target_search", from_the_middle),
+    law_levels_of_detail_change_nothing: (Scene, "triangles", coarsest_triangles),
+    law_polygons_hide_only_what_is_hidden: (occlusion, "blocker_tree", grown_tree),
+}
+
+
+@pytest.mark.parametrize("law", BREAKS, ids=lambda law: law.__name__)
+def test_law_is_broken_by_a_broken_kernel(law, monkeypatch):
+    where, name, broken = BREAKS[law]
+    monkeypatch.setattr(where, name, broken)
+    with pytest.raises(AssertionError):
+        BROKEN(given(LAWS[law])(law))()
+
+
+def test_stabbing_with_an_epsilon_is_not_exact():
+    with pytest.raises(AssertionError):
+        BROKEN(given(portal_sequences())(lambda sequence: stabs_exactly(sequence, epsilon_stab)))()
+
+
+def test_the_published_greedy_is_not_best():
+    with pytest.raises(AssertionError):
+        BROKEN(given(knapsacks())(lambda sack: spends_best(sack, greedy)))()

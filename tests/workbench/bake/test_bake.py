@@ -1,0 +1,349 @@
+"""Whole bakes: two-sided, symmetric, repeatable, resumable, and conservative against brute force."""
+
+import numpy as np
+import pytest
+import viewcell
+from builders.places import SHARED
+from builders.random_buildings import box_triangles as box
+from builders.random_buildings import scene_of, tetrahedron
+from viewcell.data.buildings.office import make_office
+from viewcell.data.errors import InputError
+from viewcell.data.scene import Role
+from viewcell.data.store.database import load
+from viewcell.verify.exact.sightline import Sight, Sightlines
+from viewcell.verify.rays.witness import visible_rows
+from viewcell.workbench.bake import run as baking
+from viewcell.workbench.bake.run import Settings
+
+METRE = 1024
+TABLES = ("cell_to_cell", "cell_to_object")
+
+
+@pytest.fixture(scope="module")
+def office():
+    return make_office(floors=1, rooms_per_side=2)
+
+
+@pytest.fixture(scope="module")
+def office_bake(office, tmp_path_factory):
+    return viewcell.bake(office, tmp_path_factory.mktemp("bake") / "office", threads=1)
+
+
+def w48():
+    folder = SHARED / "graphs" / "w48"
+    if not folder.is_dir():
+        pytest.skip("needs w48 of the shared graphs folder")
+    return folder
+
+
+def same_tables(one, other):
+    return all(getattr(one, name).equals(getattr(other, name)) for name in (*TABLES,)) and all(
+        (one.folder / f"{name}.parquet").read_bytes() == (other.folder / f"{name}.parquet").read_bytes()
+        for name in ("cells", "portals")
+    )
+
+
+def pairs(table, target):
+    return set(zip(table["cell_id"].to_pylist(), table[target].to_pylist(), strict=True))
+
+
+def check_two_sided(bake, rays):
+    """Seen is in potential, cells see each other, rows are of inhabitable cells, and nothing refutes the bake."""
+    inhabitable = bake.graph.inhabitable
+    for table, target in ((bake.cell_to_cell, "reached_cell_id"), (bake.cell_to_object, "object_id")):
+        every = pairs(table, target)
+        assert len(every) == table.num_rows and pairs(visible_rows(table), target) <= every
+        assert inhabitable[table["cell_id"].to_numpy()].all()
+    both = bake.potential_cells[np.ix_(inhabitable, inhabitable)]
+    np.testing.assert_array_equal(both, both.T, "A sees B exactly when B sees A")
+    assert both.diagonal().all()
+    result = viewcell.verify(bake, rays=rays)
+    assert result.wrong_hidden == 0 and result.refuted == 0, result.table()
+    seen = sum(visible_rows(getattr(bake, name)).num_rows for name in TABLES)
+    assert result.cell_witnesses.confirmed + result.object_witnesses.confirmed == seen
+    return result
+
+
+def test_office_is_two_sided(office_bake):
+    check_two_sided(office_bake, rays=50_000)
+    counts = office_bake.manifest["counts"]
+    assert counts["cell_pairs_seen"] == counts["cell_pairs"]
+    assert counts["object_pairs"] < 1.05 * counts["object_pairs_seen"]
+    cell = int(np.flatnonzero(office_bake.graph.inhabitable)[0])
+    assert set(office_bake.seen(cell)) <= set(office_bake.potential(cell))
+    assert 0 < len(office_bake.potential(cell)) < counts["objects"]
+
+
+def test_bare_graph_is_two_sided(tmp_path):
+    bake = viewcell.bake(w48(), tmp_path / "w48")
+    check_two_sided(bake, rays=50_000)
+    assert bake.cell_to_cell.num_rows == round(38.42857 * 182) and bake.cell_to_object.num_rows == 0
+
+
+@pytest.mark.parametrize(("threads", "block"), [(1, 24), (2, 24), (2, 1), (1, 3), (2, 5)])
+def test_repeats_threads_and_blocks_change_nothing(threads, block, office, office_bake, tmp_path, monkeypatch):
+    monkeypatch.setattr(baking, "BLOCK", block)
+    assert same_tables(viewcell.bake(office, tmp_path / "again", threads=threads), office_bake)
+
+
+def test_bare_graph_repeats(tmp_path):
+    bakes = [viewcell.bake(w48(), tmp_path / f"w48 {threads}", threads=threads) for threads in (1, 2)]
+    assert same_tables(*bakes)
+
+
+class Stopped(Exception):
+    pass
+
+
+def stop_after(blocks, monkeypatch):
+    """Interrupt a bake before it saves one more block than these."""
+    save = baking._Store.save
+    left = [blocks]
+
+    def counted(self, number, part):
+        if not left[0]:
+            raise Stopped
+        left[0] -= 1
+        save(self, number, part)
+
+    monkeypatch.setattr(baking._Store, "save", counted)
+
+
+@pytest.mark.parametrize("lost", [None, 0, 1])
+def test_resuming_equals_never_stopping(lost, office, office_bake, tmp_path, monkeypatch):
+    """Stopped after two blocks; one of them is lost or cut short on top."""
+    monkeypatch.setattr(baking, "BLOCK", 3)
+    with monkeypatch.context() as patch:
+        stop_after(2, patch)
+        with pytest.raises(Stopped):
+            viewcell.bake(office, tmp_path / "office")
+    assert not (tmp_path / "office").exists()
+    partial = next(tmp_path.iterdir())
+    if lost == 0:
+        (partial / "0.block").unlink()
+    if lost == 1:
+        (partial / "1.block").write_bytes((partial / "1.block").read_bytes()[:100])
+    assert same_tables(viewcell.bake(office, tmp_path / "office"), office_bake)
+    assert [path.name for path in tmp_path.iterdir()] == ["office"]
+
+
+def test_blocks_of_another_size_are_not_taken_for_ours(office, office_bake, tmp_path, monkeypatch):
+    """What an older version left behind may be cut into blocks differently."""
+    monkeypatch.setattr(baking, "BLOCK", 3)
+    with monkeypatch.context() as patch:
+        stop_after(2, patch)
+        with pytest.raises(Stopped):
+            viewcell.bake(office, tmp_path / "office")
+    monkeypatch.setattr(baking, "BLOCK", 5)
+    assert same_tables(viewcell.bake(office, tmp_path / "office"), office_bake)
+
+
+def test_no_budget_leaves_everything_unknown(office, tmp_path):
+    bake = viewcell.bake(office, tmp_path / "office", budget_s=1e-6)
+    cells, objects = bake.graph.cell_count, bake.manifest["counts"]["objects"]
+    sources = int(bake.graph.inhabitable.sum())
+    assert bake.cell_to_cell.num_rows == sources * cells and bake.cell_to_object.num_rows == sources * objects
+    for name in TABLES:
+        assert set(getattr(bake, name)["verdict"].to_pylist()) == {"unknown"}
+    assert check_two_sided(bake, rays=20_000).ok
+
+
+def test_a_spent_budget_is_made_up_for(office, office_bake, tmp_path):
+    """A bake that ran out of time is not taken for a finished one."""
+    viewcell.bake(office, tmp_path / "office", budget_s=1e-6)
+    assert same_tables(viewcell.bake(office, tmp_path / "office"), office_bake)
+
+
+def test_a_finished_bake_is_kept_and_a_changed_one_is_not(office, office_bake, tmp_path):
+    first = viewcell.bake(office, tmp_path / "office")
+    manifest = first.folder / "manifest.json"
+    stamp = manifest.stat().st_mtime_ns
+    viewcell.bake(office, tmp_path / "office")
+    assert manifest.stat().st_mtime_ns == stamp
+    other = viewcell.bake(office, tmp_path / "office", settings=Settings(seed=5))
+    assert manifest.stat().st_mtime_ns != stamp and other.manifest["settings"]["seed"] == 5
+    assert pairs(load(tmp_path / "office").cell_to_cell, "reached_cell_id") == pairs(
+        office_bake.cell_to_cell, "reached_cell_id"
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"budget_s": -1.0}, "budget"),
+        ({"budget_s": float("nan")}, "budget"),
+        ({"threads": 0}, "threads"),
+        ({"device": "abacus"}, "device"),
+        ({"settings": Settings(threshold_m2=-1.0)}, "threshold"),
+        ({"settings": Settings(threshold_m2=float("inf"))}, "threshold"),
+        ({"settings": Settings(seal=-0.1)}, "seal"),
+    ],
+)
+def test_bad_arguments_are_one_line(options, message, office, tmp_path):
+    with pytest.raises(InputError, match=f"^{message}: expected") as told:
+        viewcell.bake(office, tmp_path / "office", **options)
+    assert "\n" not in str(told.value) and list(tmp_path.iterdir()) == []
+
+
+def random_scene(seed):
+    """A hall of 6 x 6 x 3 m with thin walls, solid blocks, slanted solids and furniture."""
+    rng = np.random.default_rng(seed)
+    size = np.array([6, 6, 3]) * METRE
+    parts = [(box((-200, -200, -200), (*(size[:2] + 200), 0)), "occluder")]
+    for axis, side in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        low, high = np.array([-200, -200, 0]), np.array([*(size[:2] + 200), size[2]])
+        low[axis] = (-200, size[axis])[side]
+        high[axis] = (0, size[axis] + 200)[side]
+        parts.append((box(low, high), "occluder"))
+    for _ in range(4):
+        low = rng.integers(0, size - METRE) // 128 * 128
+        axis = rng.integers(0, 2)
+        high = np.minimum(low + rng.integers(2, 4, 3) * METRE, size)
+        high[axis] = low[axis] + 128
+        parts.append((box(low, high), "occluder"))
+    for role in ("occluder", "occluder", "detail", "transparent"):
+        parts.append((tetrahedron(rng.integers(0, size, (4, 3))), role))
+    for _ in range(3):
+        low = rng.integers(0, size - METRE)
+        parts.append((box(low, low + rng.integers(200, 900, 3)), "detail"))
+    sheet = box((0, 0, 0), (1, 1, 1))[:2] * np.array([1, 2 * METRE, 2 * METRE]) + np.array([3 * METRE, 2 * METRE, 0])
+    parts.append((sheet, "occluder"))
+    return scene_of(parts, [((0, 0, 0), tuple(size))])
+
+
+def brute_force(bake, rng, count):
+    """Random segments that start in inhabitable cells, with the exact verdict of what they meet.
+
+    Yields the source and the target cell of clear ones, and the source and the object of those that end on an object.
+    """
+    scene, cells = bake.scene, bake.graph.cells
+    triangles, owners = scene.triangles()
+    opaque = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
+    lines = Sightlines(triangles[opaque], owners[opaque])
+
+    def points(chosen):
+        share = rng.uniform(0.01, 0.99, (count, 3))
+        return cells[chosen, 0] + share * (cells[chosen, 1] - cells[chosen, 0])
+
+    sources = rng.choice(np.flatnonzero(bake.graph.inhabitable), count)
+    targets = rng.integers(0, len(cells), count)
+    origins = points(sources)
+    free = lines.outside_solids(origins)
+    clear = free & (lines.check(origins, points(targets)) == Sight.CLEAR)
+    picked = rng.integers(0, len(triangles), count)
+    weight = rng.dirichlet((1, 1, 1), count)
+    # A hair in front of the surface, so that the object does not hide itself.
+    ends = (weight[:, :, None] * triangles[picked]).sum(axis=1)
+    ends = ends + (origins - ends) * 1e-6
+    shown = free & (lines.check(origins, ends) == Sight.CLEAR)
+    return sources[clear], targets[clear], sources[shown], owners[picked][shown]
+
+
+@pytest.mark.parametrize("threshold_m2", [0.0, 2.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_what_brute_force_sees_is_potential(seed, threshold_m2, tmp_path):
+    """Trap: a threshold above 0 leaves walls out of the cells, and the answer must stay conservative."""
+    scene = random_scene(seed)
+    bake = viewcell.bake(scene, tmp_path / "hall", settings=Settings(threshold_m2=threshold_m2))
+    a, b, c, d = brute_force(bake, np.random.default_rng(seed), 20_000)
+    assert len(a) > 300 and len(c) > 300
+    missed = ~bake.potential_cells[a, b]
+    assert not missed.any(), f"wrong-hidden cells {a[missed][:3]} to {b[missed][:3]}"
+    missed = ~bake.potential_objects[c, d]
+    assert not missed.any(), f"wrong-hidden objects {d[missed][:3]} from cells {c[missed][:3]}"
+    check_two_sided(bake, rays=20_000)
+
+
+def two_rooms(screen, role="detail"):
+    """Two rooms joined by a doorway, and something in the doorway."""
+    m = METRE
+    parts = [
+        (box((-100, -100, -100), (4 * m + 100, 2 * m + 100, 0)), "occluder"),
+        (box((-100, -100, 2 * m), (4 * m + 100, 2 * m + 100, 2 * m + 100)), "occluder"),
+        (box((-100, -100, 0), (0, 2 * m + 100, 2 * m)), "occluder"),
+        (box((4 * m, -100, 0), (4 * m + 100, 2 * m + 100, 2 * m)), "occluder"),
+        (box((0, -100, 0), (4 * m, 0, 2 * m)), "occluder"),
+        (box((0, 2 * m, 0), (4 * m, 2 * m + 100, 2 * m)), "occluder"),
+        (box((2 * m, 0, 0), (2 * m + 100, 900, 2 * m)), "occluder"),
+        (box((2 * m, 1100, 0), (2 * m + 100, 2 * m, 2 * m)), "occluder"),
+        (screen, role),
+    ]
+    return scene_of(parts, [((0, 0, 0), (2 * m, 2 * m, 2 * m)), ((2 * m + 100, 0, 0), (4 * m, 2 * m, 2 * m))])
+
+
+def room_pair(bake):
+    """Verdict of the pair of largest cells of the two rooms, or None if hidden."""
+    cells = bake.graph.cells.astype(np.int64)
+    volume = np.prod(cells[:, 1] - cells[:, 0], axis=1)
+    sides = [cells[:, 1, 0] <= 2 * METRE, cells[:, 0, 0] >= 2 * METRE + 100]
+    one, other = (int(np.where(bake.graph.inhabitable & side, volume, 0).argmax()) for side in sides)
+    table = bake.cell_to_cell
+    row = (table["cell_id"].to_numpy() == one) & (table["reached_cell_id"].to_numpy() == other)
+    return table["verdict"].to_pylist()[int(np.flatnonzero(row)[0])] if row.any() else None
+
+
+def test_trap_line_through_an_oblique_solid_is_not_seen(tmp_path):
+    """The portals allow the line; a slanted closed solid fills the doorway, so no line passes and none is claimed."""
+    m = METRE
+    prism = np.array([(1700, 800), (2400, 600), (2500, 1300), (1800, 1400)])
+    flat = [[(x, y, z) for x, y in prism] for z in (-50, 2 * m + 50)]
+    low, high = np.array(flat)
+    triangles = [low[[0, 2, 1]], low[[0, 3, 2]], high[[0, 1, 2]], high[[0, 2, 3]]]
+    for n in range(4):
+        k = (n + 1) % 4
+        triangles += [np.array([low[n], low[k], high[k]]), np.array([low[n], high[k], high[n]])]
+    blocked = viewcell.bake(two_rooms(np.array(triangles)), tmp_path / "blocked")
+    assert room_pair(blocked) != "visible"
+    check_two_sided(blocked, rays=20_000)
+    away = np.array(triangles) * [1, 1, 0.01] + [0, 0, 1900]
+    passed = viewcell.bake(two_rooms(away.astype(int)), tmp_path / "open")
+    assert room_pair(passed) == "visible"
+
+
+def test_trap_axial_screen_hides(tmp_path):
+    blocked = viewcell.bake(
+        two_rooms(box((2010, 0, 0), (2020, 2 * METRE, 2 * METRE)), "occluder"), tmp_path / "blocked"
+    )
+    assert room_pair(blocked) is None
+    check_two_sided(blocked, rays=20_000)
+
+
+def test_trap_witness_starts_outside_every_solid(tmp_path):
+    """A cell that holds a slanted solid: every witness from it starts beside the solid, not in it."""
+    solid = tetrahedron([(100, 100, 0), (1900, 200, 0), (300, 1900, 0), (500, 500, 1900)])
+    bake = viewcell.bake(two_rooms(solid), tmp_path / "rooms")
+    triangles, owners = bake.scene.triangles()
+    lines = Sightlines(triangles, owners)
+    for name in TABLES:
+        rows = visible_rows(getattr(bake, name))
+        origins = np.column_stack([rows[f"origin_{axis}"].to_numpy() for axis in "xyz"]) / bake.grid_m
+        assert len(origins) > 5 and lines.outside_solids(origins).all()
+    held = ~lines.outside_solids(np.random.default_rng(0).uniform(100, 1800, (4000, 3)))
+    assert held.mean() > 0.1, "the solid is too small to be a trap"
+
+
+def test_verify_refutes_a_bake_with_a_row_taken_out(office_bake, tmp_path):
+    """The check that the tests above rely on does see a wrong-hidden."""
+    spoiled = load(office_bake.folder)
+    table = spoiled.cell_to_object
+    cell = int(table["cell_id"][0].as_py())
+    kept = table["cell_id"].to_numpy() != cell
+    assert spoiled.scene is not None and spoiled.potential_cells.any()
+    spoiled.__dict__["cell_to_object"] = table.filter(kept)
+    spoiled.folder = tmp_path / "spoiled"
+    assert viewcell.verify(spoiled, rays=20_000).wrong_hidden == 1
+
+
+@pytest.mark.slow
+def test_shared_duplex(tmp_path):
+    folder = SHARED / "scenes" / "ifc" / "duplex_A"
+    if not folder.is_dir():
+        pytest.skip("needs duplex_A of the shared scenes folder")
+    model = next(path for path in sorted(folder.iterdir()) if path.suffix.lower() == ".ifc")
+    bake = viewcell.bake(model, tmp_path / "duplex")
+    result = check_two_sided(bake, rays=1_000_000)
+    inhabitable, _, objects = result.counts
+    print(f"overestimate: cells {inhabitable.overestimate:.3f}, objects {objects.overestimate:.3f}")
+    assert inhabitable.overestimate < 1.15 and objects.overestimate < 1.3
+    again = viewcell.bake(model, tmp_path / "again", threads=1)
+    assert same_tables(again, bake)

@@ -1,0 +1,107 @@
+"""Curves of time against error: what is swept, what is told, and that methods that hide what is seen are found."""
+
+import numpy as np
+import pytest
+from viewcell.data.buildings.office import make_office
+from viewcell.data.errors import InputError
+from viewcell.data.store.database import load
+from viewcell.workbench import curves
+from viewcell.workbench.bake.run import Settings, bake
+from viewcell.workbench.cli import main
+from viewcell.workbench.curves import Point, Series, pareto_points, read_curves, sweep
+from viewcell.workbench.verify import seen_by_rays
+
+
+@pytest.fixture(scope="module")
+def baked(tmp_path_factory):
+    out = tmp_path_factory.mktemp("curves") / "o.bake"
+    bake(make_office(floors=1, rooms_per_side=2), out, settings=Settings(method="portals"), threads=1)
+    return out
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    small = {"THRESHOLDS_M2": (0.0,), "SPLITS": (2,), "SIDES_M": (1.0,), "SHARES": (0.2,), "RESOLUTIONS": (32,)}
+    for name, values in (small | {"CLUSTERS": (1,), "RAYS": (100, 10_000), "GRAPH_RAYS": (10, 1_000)}).items():
+        monkeypatch.setattr(curves, name, values)
+
+
+def test_every_knob_of_a_model_is_swept(baked, quick, tmp_path, capsys):
+    assert main(["curves", str(baked), "--cells", "2", "--out", str(tmp_path), "--no-progress"]) == 0
+    said = capsys.readouterr().out
+    found = read_curves(tmp_path / "curves.json")
+    methods = {(one.method, one.knob): one for one in found.series}
+    assert {method for method, _ in methods} == {
+        "portals alone",
+        "occluders alone",
+        "both",
+        "projection points",
+        "sampling alone",
+        "levels of detail",
+        "occluders, all cells",
+    }
+    assert all(p.error >= 1 and p.wrong_hidden == 0 for one in found.safe for p in one.points)
+    # More time never makes it looser.
+    early, late = sorted(methods["occluders, all cells", "budget, share"].points, key=lambda p: p.value)
+    assert early.error >= late.error and late.unknown < 0.3
+    few, many = methods["sampling alone", "rays a cell"].points
+    assert few.error < many.error < 1 and few.wrong_hidden > many.wrong_hidden > 0
+    shares = [p.error for p in methods["levels of detail", "pixels"].points]
+    assert shares == sorted(shares, reverse=True) and shares[-1] < 1
+    assert "sampling alone, rays a cell" in said and (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
+    assert "NaN" not in (tmp_path / "curves.json").read_text()
+
+
+def test_a_bare_graph_is_swept_by_portals_and_rays(graph, quick, tmp_path):
+    assert main(["bake", str(graph), "--out", str(tmp_path / "g.bake"), "--no-progress"]) == 0
+    found = sweep(load(tmp_path / "g.bake"))
+    assert [one.method for one in found.series] == ["portals alone", "sampling alone"]
+    assert found.series[0].points[0].error == 1.0
+    few, many = found.series[1].points
+    assert many.wrong_hidden < few.wrong_hidden < 14
+
+
+def test_a_method_that_hides_what_is_seen_fails(baked, quick, tmp_path, monkeypatch):
+    honest = curves.bake
+
+    def hiding(*arguments, **options):
+        made = honest(*arguments, **options)
+        if options["settings"].method == "vlod":
+            made.__dict__["potential_objects"] = np.zeros_like(made.potential_objects)
+        return made
+
+    monkeypatch.setattr(curves, "bake", hiding)
+    for name in ("THRESHOLDS_M2", "SPLITS", "SIDES_M", "SHARES", "CLUSTERS"):
+        monkeypatch.setattr(curves, name, ())
+    assert main(["curves", str(baked), "--cells", "1", "--out", str(tmp_path), "--no-progress"]) == 1
+
+
+def test_rays_see_no_more_than_is_potential_and_leave_the_bake_alone(baked):
+    made = load(baked)
+    cells, objects = seen_by_rays(made, 50_000)
+    assert not (objects & ~made.potential_objects).any() and not (cells & ~made.potential_cells).any()
+    assert objects.sum() > 0.3 * made.potential_objects.sum()
+    assert not made.potential_objects.all()
+
+
+def test_the_front_leaves_out_what_is_of_other_cells():
+    points = [Point(1.0, seconds, error, 0.0, 0) for seconds, error in ((1, 2.0), (2, 1.5), (3, 1.6))]
+    assert pareto_points([Series("a", "k", points)]) == points[:2]
+    other = Series("b", "k", [Point(1.0, 0.1, 1.0, 0.0, 0)], apart=True)
+    assert pareto_points([Series("a", "k", points), other]) == points[:2]
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"scene": "a"}', '{"scene": "a", "pairs": 1, "series": [{}]}'])
+def test_other_files_are_no_curves(text, tmp_path):
+    path = tmp_path / "curves.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match="curves"):
+        read_curves(path)
+
+
+def test_unusable_folders_are_told_in_one_line(baked, quick, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(["curves", str(tmp_path), "--no-progress"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    with pytest.raises(InputError, match="expected a folder"):
+        curves.write_curves(curves.Curves("a", [Series("sampling alone", "k", [])], 0), tmp_path / "file")

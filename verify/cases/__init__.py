@@ -1,0 +1,1 @@
+"""Cases on the edge of a verdict, as text files."""

@@ -1,0 +1,1 @@
+"""Checkers of certificates: they import arithmetic and data, and nothing that finds a proof."""

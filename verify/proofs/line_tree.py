@@ -1,0 +1,291 @@
+"""The certificates of a bake (data/store/certificates.py), checked exactly and without what made them.
+
+What is absent from the tables of a bake must lie in boxes that are proved hidden, each by a line tree (`hides`, here)
+or by pieces of its shaft (verify/proofs/shaft.py), past blockers that the model or the cell graph itself shows to
+be real. All arithmetic is that of Python integers.
+
+The claim of a proof: the sightlines from the open cell to the box that pass every blocker are not an open set. So lines
+on the border of what a row allows need not be looked at, and every row may be read as strict.
+"""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...data.errors import InputError
+from ...data.scene import Role
+from ...data.store.certificates import BLOCKERS, CORNERS, NODE_STEP, PROOFS, TABLES, TREES
+from ...data.store.scene_folder import read_table
+from .boxes import in_boxes
+from .certified import EXAMPLES, Certified
+from .opaque import OpaqueSurfaces
+from .shaft import check_shafts
+from .tables import box_text, corners_of, places_of
+
+if TYPE_CHECKING:
+    from ...data.graph import CellGraph
+    from ...data.store.database import Bake
+
+Box = list[list[int]]
+# Rows (i, j, a, b) are kept in a list for each ordered pair of axes; a cycle takes one row of each of its lists.
+LISTS = ((0, 1), (1, 0), (1, 2), (2, 1), (0, 2), (2, 0))
+CYCLES = ((0, 1), (2, 3), (4, 5), (0, 2, 5), (4, 3, 1))
+TAG_BASE, CUT_STEP = 128, 1 << 24
+
+
+@dataclass(frozen=True)
+class Blocker:
+    """A rectangle of an axial plane: the axis, and its flat box."""
+
+    axis: int
+    box: Box
+
+
+def has_certificates(bake: "Bake") -> bool:
+    """Whether a bake claims to have them, or has some."""
+    return bool(bake.manifest.get("settings", {}).get("certify")) or (bake.folder / "proofs.parquet").exists()
+
+
+def check_certificates(bake: "Bake") -> Certified:
+    """Check every certificate of a bake, and that everything it hides has one.
+
+    Exact: a blocker, a proof or a pair is called good only if it is. What another maker certifies by a partition that
+    no sequence of cuts makes, or by a disc that turns away from its own outline, fails although it may be true.
+
+    Raises:
+        InputError: tables are missing or lack a column, coordinates are off the grid, or ids repeat.
+    """
+    start = time.perf_counter()
+    paths = {name: bake.folder / f"{name}.parquet" for name in TABLES}
+    proofs, trees = read_table(paths["proofs"], PROOFS), read_table(paths["trees"], TREES)
+    ids = proofs["proof_id"].to_numpy()
+    cell = places_of(proofs["cell_id"].to_numpy(), np.arange(bake.graph.cell_count), paths["proofs"], "cell_id")
+    boxes = corners_of(proofs, CORNERS, bake.grid_m, paths["proofs"]).reshape(-1, 2, 3)
+    places_of(ids, ids, paths["proofs"], "proof_id", once=True)
+    closed = proofs["closed"].to_numpy(zero_copy_only=False).astype(bool)
+    found = Certified(len(ids), made_s=float(bake.manifest.get("certificate_s", 0.0)))
+    found.bytes = sum(path.stat().st_size for path in paths.values() if path.exists())
+    surfaces = _opaque_surfaces(bake)
+    blockers = _read_blockers(bake, surfaces, found)
+    good = check_shafts(bake, surfaces, ids, bake.graph.cells[cell], boxes, found)
+    rows = places_of(trees["proof_id"].to_numpy(), ids, paths["trees"], "proof_id", once=True)
+    for row, words in zip(rows.tolist(), trees["words"].to_pylist(), strict=True):
+        source = bake.graph.cells[cell[row]].tolist()
+        good[row] = good[row] or hides(source, boxes[row].tolist(), bool(closed[row]), words, blockers)
+        found.leaves += sum(word < 0 for word in words)
+    found.failed_proofs = int((~good).sum())
+    found.tell(f"proof {ids[row]}: cell {cell[row]} x {box_text(boxes[row])}" for row in np.flatnonzero(~good))
+    _check_objects(bake, cell[good & closed], boxes[good & closed], found)
+    if bake.claims_cells:
+        _check_cells(bake, cell[good], boxes[good], found)
+    found.checked_s = time.perf_counter() - start
+    return found
+
+
+def hides(source: Box, target: Box, closed: bool, words: list[int], blockers: dict[int, Blocker]) -> bool:
+    """Whether a line tree proves that no sightline leads from a cell into a box.
+
+    Args:
+        source: low and high corner of the cell [grid steps].
+        target: likewise of the box.
+        closed: whether a blocker on the box's near face leaves that face in sight.
+        words: of the tree.
+        blockers: by id, real ones.
+
+    A tree says of every line through both that it meets a blocker after it left the cell and before it enters the box.
+    So does every sightline along it, wherever it begins and ends; and if the boxes overlap, no tree can say so.
+    """
+    rest = iter(words)
+    try:
+        for octant in range(8):
+            s, t = mirrored(source, octant), mirrored(target, octant)
+            if all(t[1][i] > s[0][i] for i in range(3)):
+                rows = [[(box[0][i], box[1][j]) for box in (s, t)] for i, j in LISTS]
+                if not _excluded(rest, rows, s, t, closed, blockers, octant):
+                    return False
+    except (StopIteration, LookupError, RecursionError):
+        # The tree ends too early, or names rows or blockers that do not exist.
+        return False
+    return next(rest, None) is None
+
+
+def mirrored(box: Box, octant: int) -> Box:
+    """A box after the axes were mirrored on which the octant is negative."""
+    flip = [octant >> i & 1 for i in range(3)]
+    return [[-box[1 - side][i] if flip[i] else box[side][i] for i in range(3)] for side in (0, 1)]
+
+
+def _excluded(
+    words: Iterator[int],
+    rows: list[list[tuple[int, int]]],
+    s: Box,
+    t: Box,
+    closed: bool,
+    blockers: dict[int, Blocker],
+    octant: int,
+) -> bool:
+    """Whether the next words show that rows exclude all lines of an octant past the blockers; s and t are mirrored."""
+    word = next(words)
+    if word < 0:
+        more, tag = divmod(-1 - word, CUT_STEP)
+        return contradict([_cut(rows, tag), *[_cut(rows, -1 - next(words)) for _ in range(more)]])
+    number, order = divmod(word, NODE_STEP)
+    blocker = blockers[number]
+    k, (low, high) = blocker.axis, mirrored(blocker.box, octant)
+    for way in _ways(k, low, high, [order >> 2 * n & 3 for n in range(4)], s, t, closed):
+        for i, j, a, b in way:
+            rows[LISTS.index((i, j))].append((a, b))
+        done = _excluded(words, rows, s, t, closed, blockers, octant)
+        for i, j, _, _ in way:
+            rows[LISTS.index((i, j))].pop()
+        if not done:
+            return False
+    return True
+
+
+def _ways(
+    k: int, low: list[int], high: list[int], order: list[int], s: Box, t: Box, closed: bool
+) -> list[list[tuple[int, int, int, int]]]:
+    """Rows (i, j, a, b), x_i = a before x_j = b, of every way to miss a blocker on plane x_k = c; a line takes one."""
+    c, others = low[k], [(k + 1) % 3, (k + 2) % 3]
+    if sorted(order) != [0, 1, 2, 3]:
+        raise LookupError("a side is missing")
+    beyond = []
+    for side in order:
+        u = others[side // 2]
+        # Below the low edge at the plane: the plane comes before the edge. Above the high edge: after it.
+        beyond.append((u, k, high[u], c) if side % 2 else (k, u, c, low[u]))
+    ways = [[*((j, i, b, a) for i, j, a, b in beyond[:n]), beyond[n]] for n in range(4)]
+    if c > t[0][k] or (closed and c == t[0][k]):
+        ways.append([(i, k, t[0][i], c) for i in others])
+    if c < s[1][k]:
+        ways.append([(k, i, c, s[1][i]) for i in others])
+    return ways
+
+
+def _cut(rows: list[list[tuple[int, int]]], tag: int) -> list[int]:
+    """The cut g of a cycle that a tag names: the sum of its rows w_i a - w_j b < xi_i - xi_j is g . w < 0."""
+    cycle, places = CYCLES[tag % 8], tag // 8
+    g = [0, 0, 0]
+    for p in cycle:
+        (i, j), (a, b) = LISTS[p], rows[p][places % TAG_BASE]
+        g[i] += a
+        g[j] -= b
+        places //= TAG_BASE
+    return g
+
+
+def contradict(cuts: list[list[int]]) -> bool:
+    """Whether no w > 0 has g . w < 0 for all of one to three cuts g.
+
+    It has none if weights >= 0, not all 0, add the cuts up to something nowhere negative. Weights of the three cuts can
+    be taken from the extreme rays of their cone, where as many conditions are tight as there are cuts, less one.
+    """
+    rows = list(zip(*cuts, strict=True))
+    if len(cuts) == 1:
+        rays = [(1,)]
+    elif len(cuts) == 2:
+        rays = [(-b, a) for a, b in rows]
+    elif len(cuts) == 3:
+        rays = [
+            (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+            for a, b in combinations(rows, 2)
+        ]
+    else:
+        return False
+    return any(
+        min(ray) >= 0 and any(ray) and all(sum(x * y for x, y in zip(row, ray, strict=True)) >= 0 for row in rows)
+        for ray in (*rays, *(tuple(-x for x in ray) for ray in rays))
+    )
+
+
+def _opaque_surfaces(bake: "Bake") -> OpaqueSurfaces | None:
+    """Opaque triangles of the model; None for a bare graph."""
+    if bake.scene is None:
+        return None
+    triangles, owners = bake.scene.triangles()
+    opaque = bake.scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
+    return OpaqueSurfaces(triangles[opaque], owners[opaque])
+
+
+def _read_blockers(bake: "Bake", surfaces: OpaqueSurfaces | None, found: Certified) -> dict[int, Blocker]:
+    """Blockers by id, without those that are not real."""
+    path = bake.folder / "blockers.parquet"
+    table = read_table(path, BLOCKERS)
+    corners = corners_of(table, BLOCKERS[2:], bake.grid_m, path)
+    ids, axes = table["blocker_id"].to_numpy(), table["axis"].to_numpy()
+    places_of(ids, ids, path, "blocker_id", once=True)
+    blockers: dict[int, Blocker] = {}
+    for number, k, (c, u0, v0, u1, v1) in zip(ids.tolist(), axes.tolist(), corners.tolist(), strict=True):
+        if k not in (0, 1, 2):
+            raise InputError(f"{path}: expected an axis from 0 to 2, found {k}")
+        rectangle = np.array([[[u0, v0], [u1, v1]]])
+        if surfaces is None:
+            real = graph_blocks(bake.graph, k, c, rectangle[0])
+        else:
+            real = surfaces.open_rectangle(k, c, rectangle) is None
+        if real:
+            blockers[number] = Blocker(k, [[*p[:k], c, *p[k:]] for p in ([u0, v0], [u1, v1])])
+        else:
+            found.failed_occluders += 1
+            told = f"blocker {number}: {box_text(rectangle[0])} of plane {c} of axis {k} does not block"
+            found.tell([told] if found.failed_occluders <= EXAMPLES else [])
+    return blockers
+
+
+def graph_blocks(graph: "CellGraph", axis: int, plane: int, rectangle: np.ndarray) -> bool:
+    """Whether no sightline that stays in the cells and passes portals crosses a plane inside a rectangle.
+
+    Where it crosses the plane it is either inside a cell that reaches over it, or leaves one cell for another, which it
+    may only do through a portal on the plane. So neither may meet the inside of the rectangle.
+    """
+    uv = [i for i in range(3) if i != axis]
+    over = (graph.cells[:, 0, axis] < plane) & (graph.cells[:, 1, axis] > plane)
+    on = (graph.portal_axis == axis) & (graph.portals[:, 0, axis] == plane)
+    gaps = np.concatenate([graph.cells[over], graph.portals[on]])[:, :, uv]
+    return not ((gaps[:, 0] < rectangle[1]) & (gaps[:, 1] > rectangle[0])).all(axis=1).any()
+
+
+def _check_cells(bake: "Bake", cell: np.ndarray, boxes: np.ndarray, found: Certified) -> None:
+    """Count the hidden pairs of cells that proofs cover: a sightline can be followed either way."""
+    cells, inhabitable = bake.graph.cells, bake.graph.inhabitable
+    proved = np.zeros((len(cells), len(cells)), bool)
+    for source, (low, high) in zip(cell, boxes, strict=True):
+        proved[source] |= (cells[:, 0] >= low).all(axis=1) & (cells[:, 1] <= high).all(axis=1)
+    hidden = ~bake.potential_cells & inhabitable[:, None]
+    bad = np.argwhere(hidden & ~(proved | proved.T))
+    found.covered += int(hidden.sum()) - len(bad)
+    found.uncovered += len(bad)
+    found.tell(f"cell {a}, cell {b}: hidden, but in no box of a proof that holds" for a, b in bad)
+
+
+def _check_objects(bake: "Bake", cell: np.ndarray, boxes: np.ndarray, found: Certified) -> None:
+    """Count the hidden pairs (cell, object) whose triangles lie in boxes of proofs."""
+    if bake.scene is None:
+        return
+    triangles, owners = bake.scene.triangles()
+    starts = np.searchsorted(owners, np.arange(len(bake.scene.objects) + 1))
+    bounds, present = bake.scene.object_bounds(), np.diff(starts) > 0
+    known: dict[tuple[int, bytes], bool] = {}
+    bad = []
+    for source in np.flatnonzero(bake.graph.inhabitable):
+        hidden = np.flatnonzero(~bake.potential_objects[source] & present)
+        own = np.unique(boxes[cell == source], axis=0)
+        for target in hidden.tolist():
+            low, high = bounds[target]
+            if ((own[:, 0] <= low) & (own[:, 1] >= high)).all(axis=1).any():
+                continue
+            near = own[((own[:, 0] <= high) & (own[:, 1] >= low)).all(axis=1)]
+            key = target, near.tobytes()
+            if key not in known:
+                known[key] = in_boxes(triangles[starts[target] : starts[target + 1]].astype(np.int64), near)
+            if not known[key]:
+                bad.append((source, target))
+        found.covered += len(hidden)
+    found.covered -= len(bad)
+    found.uncovered += len(bad)
+    found.tell(f"cell {a}, object {b}: hidden, but not all of it in boxes of proofs that hold" for a, b in bad)

@@ -1,0 +1,1 @@
+"""Sampling: rays cast, guided and judged exactly."""

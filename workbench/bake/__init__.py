@@ -1,0 +1,1 @@
+"""Bake: a model in, potentially visible sets out."""

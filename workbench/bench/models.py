@@ -1,0 +1,111 @@
+"""Whole models: each is baked and verified, time beside error.
+
+Run `python -m viewcell.workbench.bench.models MODEL... [--rays N]`; a MODEL is anything that `viewcell bake` takes.
+"""
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from ... import bake, verify
+from ...data.errors import InputError
+from ...data.opaque import opaque_planes
+from ...data.scene import Role
+from ...data.store.database import Bake
+from ...solvers.visibility.cells import search_rounds
+from ...solvers.visibility.engine import Engine
+from ...verify.findings import Counts, VerifyResult
+from .timing import commit, print_head, print_row, quiet
+
+RAYS = 1_000_000
+HEAD = (
+    "model",
+    "cells",
+    "inhabitable",
+    "portals",
+    "objects",
+    "seconds by phase",
+    "overestimate: cells, inhabitable",
+    "cells, all",
+    "objects",
+    "unknown %: cells, inhabitable / all / objects",
+    "undecided % of all pairs of cells",
+    "rays",
+    "wrong hidden",
+    "rays a second",
+    "of Embree's own",
+    "witnesses confirmed, refuted",
+    "commit",
+)
+
+
+def undecided_percent(made: Bake) -> float:
+    """Pairs (inhabitable cell, cell) that the target search gives up on, and that have no witness [% of all pairs]."""
+    scene, graph = made.scene, made.graph
+    opaque = None
+    if scene is not None:
+        triangles, owners = scene.triangles()
+        opaque = opaque_planes(triangles[scene.object_mask(Role.OCCLUDER)[owners]])
+    engine = Engine(scene, graph, opaque, seed=0, threads=2, device="cpu")
+    table = made.cell_to_cell
+    unknown = np.array([str(verdict) == "unknown" for verdict in table["verdict"].to_pylist()], bool)
+    source, target = (table[name].to_numpy()[unknown] for name in ("cell_id", "reached_cell_id"))
+    pairs = np.column_stack([source, target, np.zeros(len(source), int)])[source != target]
+    given_up = search_rounds(engine.model, graph.cells, pairs).verdict == 2 if len(pairs) else np.zeros(0, bool)
+    return 100.0 * float(given_up.sum()) / (int(graph.inhabitable.sum()) * graph.cell_count)
+
+
+def together(counts: list[Counts]) -> Counts:
+    """Several classes as one."""
+    return Counts("all", sum(c.potential for c in counts), sum(c.seen for c in counts), sum(c.by_rays for c in counts))
+
+
+def columns(name: str, made: Bake, result: VerifyResult) -> list[object]:
+    """One row of the table."""
+    facts, objects = made.manifest, result.counts[-1]
+    cells = together(result.counts[:-1])
+    classes = (result.counts[0], cells, objects)
+    confirmed = result.cell_witnesses.confirmed + result.object_witnesses.confirmed
+    return [
+        name,
+        *(int(facts["counts"].get(count, 0)) for count in ("cells", "inhabitable", "portals", "objects")),
+        ", ".join(f"{phase} {seconds:.1f}" for phase, seconds in facts["seconds"].items()),
+        *(c.columns()[2] for c in classes),
+        " / ".join(f"{c.unknown_percent:.2f}" for c in classes),
+        f"{undecided_percent(made):.4f}",
+        result.rays,
+        result.wrong_hidden,
+        f"{result.rays_per_second:,.0f}",
+        f"{result.rate_ratio:.0%}" if result.embree_rates else "-",
+        f"{confirmed:,}, {result.refuted:,}",
+        commit(),
+    ]
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print the table. Returns the exit code: 1 if something forbidden was found."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("models", nargs="+", type=Path, metavar="MODEL")
+    parser.add_argument("--rays", type=int, default=RAYS)
+    options = parser.parse_args(argv)
+    quiet()
+    print_head(HEAD)
+    stood = True
+    try:
+        for model in options.models:
+            with tempfile.TemporaryDirectory() as scratch:
+                made = bake(model, Path(scratch) / f"{model.stem}.bake")
+                result = verify(made, rays=options.rays)
+                print_row(columns(model.name, made, result))
+                stood &= result.ok
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0 if stood else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

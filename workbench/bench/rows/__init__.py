@@ -1,0 +1,1 @@
+"""Rows of the benchmark, one file for each kind of work."""

@@ -1,0 +1,1 @@
+"""Check anybody's potentially visible sets."""

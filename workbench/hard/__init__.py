@@ -1,0 +1,1 @@
+"""Hard cases through every kernel, and kernels as numbers get hard."""

@@ -1,0 +1,1 @@
+"""Look at a bake: plans, sets, numbers, one HTML page."""

@@ -1,0 +1,305 @@
+"""Look at a bake: plans of its storeys, sets of cells, and the numbers, as Markdown and PNG and as one HTML page."""
+
+import re
+import shutil
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...data.errors import InputError
+from ...data.scene import Role
+from ...verify.findings import count_pairs
+from ...verify.rays.witness import read_witnesses, visible_rows
+from .plans import Painter, Section, Storey, find_storeys, plan_of
+from .web_page import page, read_curves_json
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...data.store.database import Bake
+
+# Sightlines drawn, to the largest cells and objects that are seen.
+SIGHTLINES_MOST = {"cell": 40, "object": 20}
+UNKNOWN_LISTED = 20
+STOREY_CAPTION = (
+    "What can be walked into is cream; red strokes are the openings (portals) through which cells see each other, "
+    "at the height of the cut, 1.2 m above the floor."
+)
+CALL = re.compile(r"make_(\w+)\((.*)\)")
+COUNTED = ("cells", "inhabitable cells", "portals", "objects", "opaque triangles")
+
+
+def report(
+    bake: "Bake",
+    *,
+    cells: "Sequence[int] | None" = None,
+    out: str | Path | None = None,
+    curves: str | Path | None = None,
+) -> Path:
+    """Write report.md and its pictures, and report.html, which shows every cell and needs no other file.
+
+    Args:
+        bake: the bake.
+        cells: cells whose potentially visible sets are shown; by default three inhabitable ones: the median set, the
+            worst overestimate and the largest set.
+        out: folder to write, made if need be; by default `report` inside the bake folder.
+        curves: curves of time against error for the page; by default curves.json in that folder, if there is one.
+
+    Returns:
+        Path of report.md.
+
+    Raises:
+        InputError: a cell does not exist or is not inhabitable, the curves are none, or the folder cannot be written.
+    """
+    chosen = choose_cells(bake) if cells is None else {int(cell): "chosen" for cell in cells}
+    for cell in chosen:
+        if not (0 <= cell < bake.graph.cell_count and bake.graph.inhabitable[cell]):
+            raise InputError(f"cells: expected ids of inhabitable cells, found {cell}")
+    folder = Path(out) if out else Path(bake.folder) / "report"
+    if curves is None and (folder / "curves.json").exists():
+        curves = folder / "curves.json"
+    drawn = None if curves is None else read_curves_json(curves)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder) as scratch:
+            _write(bake, chosen, Path(scratch))
+            (Path(scratch) / "report.html").write_text(page(bake, model_name(bake), drawn), encoding="utf-8")
+            for made in sorted(Path(scratch).iterdir()):
+                shutil.move(made, folder / made.name)
+    except OSError as error:
+        raise InputError(f"{folder}: expected a folder to write the report to, found {error.strerror}") from None
+    return folder / "report.md"
+
+
+def choose_cells(bake: "Bake") -> dict[int, str]:
+    """Three telling inhabitable cells and why; fewer where they coincide."""
+    sources = np.flatnonzero(bake.graph.inhabitable)
+    if not len(sources):
+        return {}
+    potential = _potential(bake)[sources].sum(axis=1)
+    seen = _seen_counts(bake)[sources]
+    ratio = potential / np.maximum(seen, 1)
+    by_size = np.argsort(potential, kind="stable")
+    places = {
+        "median set": by_size[len(by_size) // 2],
+        "worst overestimate": ratio.argmax(),
+        "largest set": by_size[-1],
+    }
+    chosen: dict[int, str] = {}
+    for why, place in places.items():
+        cell = int(sources[place])
+        chosen[cell] = f"{chosen[cell]}, {why}" if cell in chosen else why
+    return chosen
+
+
+def _seen_counts(bake: "Bake") -> np.ndarray:
+    """Number of witnessed cells, or objects of a bake that claims nothing of cells, of every cell, shape (cells,)."""
+    table = bake.cell_to_cell if bake.claims_cells else bake.cell_to_object
+    return np.bincount(visible_rows(table)["cell_id"].to_numpy(), minlength=bake.graph.cell_count)
+
+
+def _potential(bake: "Bake") -> np.ndarray:
+    """What `_seen_counts` counts, potentially visible, shape (cells, targets), bool."""
+    return bake.potential_cells if bake.claims_cells else bake.potential_objects
+
+
+def _write(bake: "Bake", chosen: dict[int, str], folder: Path) -> None:
+    painter = Painter(bake.graph, bake.scene, bake.grid_m, whole=not bake.claims_cells)
+    name = model_name(bake)
+    lines = [f"# {name}", "", *_numbers(bake), ""]
+    storeys = find_storeys(bake.graph, bake.grid_m) if bake.claims_cells else []
+    lines += ["## Storeys", ""] if storeys else []
+    for number, storey in enumerate(storeys):
+        title = f"Storey {number}: floor at {storey.floor * bake.grid_m:.2f} m, {len(storey.cells)} inhabitable cells"
+        painter.storey(storey, f"{name}, {title[0].lower()}{title[1:]}", folder / f"storey-{number}.png")
+        lines += [f"### {title}", "", f"![{title}](storey-{number}.png)", "", STOREY_CAPTION, ""]
+    lines += ["## Potentially visible sets", "", *_set_table(bake, chosen), ""]
+    shadows = None if bake.claims_cells else _Shadows(bake)
+    for cell, why in chosen.items():
+        path = folder / f"cell-{cell}.png"
+        if shadows is None:
+            title, caption = _draw_set(bake, painter, storeys, cell, path)
+        else:
+            title, caption = _draw_objects(bake, painter, shadows, cell, path)
+        lines += [f"### Cell {cell}: {why}", "", f"![{title}](cell-{cell}.png)", "", caption, ""]
+        lines += _unknown_targets(bake, cell)
+    (folder / "report.md").write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+
+
+class _Shadows:
+    """Occluders of a model, and how vLOD's method shrinks them for a view cell."""
+
+    def __init__(self, bake: "Bake") -> None:
+        from ...data.occludees import find_occludees
+        from ...solvers.visibility.engine import find_occluders, with_details
+        from ...solvers.visibility.projection import join_outlines, rectangle_outlines
+        from ..bake.run import opaque_rectangles
+
+        regions, patches = find_occluders(bake.scene, with_details(bake.scene, opaque_rectangles(bake.scene)))
+        self._outlines = join_outlines(rectangle_outlines(regions.boxes), patches)
+        self._pieces = find_occludees(bake.scene).pieces
+        self._cells = bake.graph.cells
+
+    def of(self, cell: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Projection points, corners and starts of the shrunk occluders of a cell."""
+        from ...solvers.visibility.projection import VlodSettings, shrunk_occluders
+
+        settings = VlodSettings(clusters=6, objective="socp")
+        found = shrunk_occluders(self._cells[cell], self._outlines, self._pieces, settings)
+        return found.points[np.unique(found.cluster)], found.corners, found.starts
+
+
+def _draw_objects(bake: "Bake", painter: Painter, shadows: _Shadows, cell: int, path: Path) -> tuple[str, str]:
+    """Draw the objects that a view cell sees; returns the picture's title and caption."""
+    seen, lines = _sights(bake, cell, "object")
+    kinds = np.where(bake.potential_objects[cell], "unknown", "hidden")
+    kinds[seen] = "seen"
+    unknown, hidden = (int((kinds == kind).sum()) for kind in ("unknown", "hidden"))
+    title = f"View cell {cell}: {len(seen):,} objects seen, {unknown:,} unknown, {hidden:,} hidden"
+    found = shadows.of(cell)
+    painter.object_set(cell, kinds, found, lines, title, path)
+    caption = (
+        f"Objects cut by the two sections: blue ones are seen from the red view cell, orange ones ({unknown:,} in all) "
+        f"may be, grey ones are proved hidden. Green are the occluders as vLOD's method shrinks them for projection "
+        f"points (crosses, one for each of six directions), {len(found[2]) - 1:,} in all: what they cover from such a "
+        f"point is hidden from the whole cell. The bake itself proves more, without projection points. "
+        f"The {len(lines)} lines are sightlines to the largest objects seen."
+    )
+    return title, caption
+
+
+def model_name(bake: "Bake") -> str:
+    """The model's file name, or what a synthetic model is in a few words."""
+    source = str(bake.manifest.get("source", ""))
+    call = CALL.fullmatch(source)
+    if call is None:
+        return Path(source).name or Path(bake.folder).name
+    like, floors = re.search(r"like='([^']+)'", call[2]), re.search(r"floors=(\d+)", call[2])
+    size = f" like {like[1]}" if like else f", {floors[1]} floors" if floors else ""
+    return f"Synthetic {call[1]}{size}"
+
+
+def _draw_set(bake: "Bake", painter: Painter, storeys: list[Storey], cell: int, path: Path) -> tuple[str, str]:
+    """Draw one cell's set; returns the picture's title and caption."""
+    seen_cells, cell_lines = _sights(bake, cell, "cell")
+    _, object_lines = _sights(bake, cell, "object")
+    kinds = np.where(bake.potential_cells[cell], "unknown", "hidden")
+    kinds[seen_cells] = "seen"
+    kinds[cell] = "source"
+    unknown, drawn = int((kinds == "unknown").sum()), np.concatenate([cell_lines, object_lines])
+    potential = int(bake.potential_cells[cell].sum())
+    storey = next(s for s in storeys if cell in s.cells)
+    low, high = bake.graph.cells[cell, :, 2]
+    section = plan_of(storey, bake.grid_m)
+    if not low < section.level < high:
+        section = Section(2, (int(low) + int(high)) // 2 + 0.5)
+    name = str(bake.graph.cell_names[cell])
+    named = f"Cell {cell}{f' ({name})' if name else ''}"
+    title = f"{named}: {potential - unknown:,} cells seen, itself included, {unknown:,} unknown"
+    painter.visible_set(cell, kinds, drawn, section, title, path)
+    caption = (
+        f"From the red cell one can see into every blue cell, and perhaps into the yellow ones ({unknown:,} in all); "
+        f"white cells are proved hidden. The {len(drawn)} lines are sightlines to the largest cells and objects seen; "
+        f"they are drawn whole, also where they run above or below the cut."
+    )
+    return title, caption
+
+
+def _sights(bake: "Bake", cell: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Targets that have a witness, and the witnesses of the largest, shape (n, 2, 3), in grid steps."""
+    table, column = (bake.cell_to_cell, "reached_cell_id") if kind == "cell" else (bake.cell_to_object, "object_id")
+    rows = visible_rows(table)
+    sights = read_witnesses(rows.filter(rows["cell_id"].to_numpy() == cell), column, bake.grid_m)
+    lines = np.stack([sights.origins, sights.ends], axis=1)
+    good = np.flatnonzero(np.isfinite(lines).all(axis=(1, 2)) & ((sights.targets != cell) | (kind == "object")))
+    size = _sizes(bake, kind)[sights.targets[good]]
+    return sights.targets, lines[good[np.argsort(-size, kind="stable")[: SIGHTLINES_MOST[kind]]]]
+
+
+def _sizes(bake: "Bake", kind: str) -> np.ndarray:
+    """Length of the diagonals of all cells' or objects' boxes [grid steps], float64; below 0 for empty objects."""
+    boxes = bake.graph.cells if kind == "cell" else bake.scene.object_bounds() if bake.scene else np.zeros((0, 2, 3))
+    extent = (boxes[:, 1].astype(np.float64) - boxes[:, 0]).min(axis=1, initial=np.inf)
+    return np.where(extent < 0, -1.0, np.linalg.norm(boxes[:, 1].astype(np.float64) - boxes[:, 0], axis=1))
+
+
+def _unknown_targets(bake: "Bake", cell: int) -> list[str]:
+    """Table of the largest targets that have neither witness nor proof."""
+    rows = []
+    kinds = [("cell", bake.potential_cells[cell])] if bake.claims_cells else []
+    for kind, potential in (*kinds, ("object", bake.potential_objects[cell])):
+        unknown = potential.copy()
+        unknown[_sights(bake, cell, kind)[0]] = False
+        unknown[cell if kind == "cell" else []] = False
+        ids, sizes = np.flatnonzero(unknown), _sizes(bake, kind)
+        last = ~bake.graph.inhabitable[ids] if kind == "cell" else np.zeros(len(ids), bool)
+        for target in ids[np.lexsort([-sizes[ids], last])[:UNKNOWN_LISTED]]:
+            rows.append(f"| {_describe(bake, kind, int(target))} | {sizes[target] * bake.grid_m:.2f} |")
+        if len(ids) > UNKNOWN_LISTED:
+            rows.append(f"| and {len(ids) - UNKNOWN_LISTED:,} smaller {kind}s | | | |")
+    if not rows:
+        return []
+    head = [
+        "Unknown from here, inhabitable cells and the largest first:",
+        "",
+        "| target | kind | name | diagonal [m] |",
+        "|---|---|---|---|",
+    ]
+    return [*head, *rows, ""]
+
+
+def _describe(bake: "Bake", kind: str, target: int) -> str:
+    """Id, kind and name of a target, as three columns."""
+    if kind == "cell":
+        place = "inhabitable cell" if bake.graph.inhabitable[target] else "wall, sliver or exterior cell"
+        return f"cell {target} | {place} | {bake.graph.cell_names[target]}"
+    placed = bake.scene.objects[target]
+    name = " ".join(placed.name.replace("|", "/").split())
+    return f"object {target} | {placed.kind} ({placed.role.value}) | {name}"
+
+
+def _numbers(bake: "Bake") -> list[str]:
+    """Tables of counts, overestimates and seconds."""
+    triangles = 0
+    if bake.scene is not None:
+        opaque = bake.scene.object_mask(Role.OCCLUDER, Role.DETAIL)
+        triangles = int(opaque[bake.scene.triangles()[1]].sum())
+    objects = len(bake.scene.objects) if bake.scene is not None else 0
+    graph = bake.graph
+    values = (graph.cell_count, int(graph.inhabitable.sum()), graph.portal_count, objects, triangles)
+    lines = ["| model | |", "|---|---|"]
+    lines += [f"| {name} | {value:,} |" for name, value in zip(COUNTED, values, strict=True)]
+    lines += [
+        "",
+        "| targets, from inhabitable cells | potential | seen | overestimate | unknown |",
+        "|---|---|---|---|---|",
+    ]
+    for c in count_pairs(bake):
+        lines.append(f"| {c.name} | {' | '.join(c.columns())} |")
+    seconds = {k: v for k, v in bake.manifest.get("seconds", {}).items() if isinstance(v, int | float)}
+    if seconds:
+        lines += ["", "| phase | seconds |", "|---|---|", *(f"| {k} | {v:.2f} |" for k, v in seconds.items())]
+    skipped = bake.manifest.get("skipped", [])
+    if skipped:
+        lines += ["", f"{len(skipped)} parts of the model could not be read; they are listed in manifest.json."]
+    return lines
+
+
+def _set_table(bake: "Bake", chosen: dict[int, str]) -> list[str]:
+    """One row for each chosen cell."""
+    seen = _seen_counts(bake)
+    lines = [
+        "Cells that a cell sees, itself included:" if bake.claims_cells else "Objects that a view cell sees:",
+        "",
+        "| cell | name | potential | seen | overestimate | unknown |",
+    ]
+    lines.append("|---|---|---|---|---|---|")
+    for cell in chosen:
+        potential, known = int(_potential(bake)[cell].sum()), int(seen[cell])
+        ratio = f"{potential / known:.3f}" if known else "no witness"
+        lines.append(
+            f"| {cell} | {bake.graph.cell_names[cell]} | {potential:,} | {known:,} | {ratio} | {potential - known:,} |"
+        )
+    return lines

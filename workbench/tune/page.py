@@ -1,0 +1,143 @@
+"""What a tuning leaves: candidates with time and error, their Pareto front, and the files that show and hold them."""
+
+import base64
+import html
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
+
+from ..files import write_files
+from .plots import COLOURS, MARKERS, STYLE
+
+if TYPE_CHECKING:
+    from ...data.store.database import Bake
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A setting and how it did.
+
+    Attributes:
+        name: in words.
+        kind: drawn in one colour.
+        time: what is drawn to the right.
+        error: what is drawn upwards; at most as good as it says.
+        numbers: other columns.
+        settings: of `bake`, or None if it cannot be asked to do so.
+    """
+
+    name: str
+    kind: str
+    time: float
+    error: float
+    numbers: dict[str, object] = field(default_factory=dict)
+    settings: dict[str, object] | None = None
+
+
+def default_out(bake: "Bake") -> Path:
+    """Where a tuning goes that was not told where: named after the bake, beside it."""
+    folder = Path(bake.folder).resolve()
+    return folder.with_name(f"{folder.name}.tune")
+
+
+def pareto_front(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Those that no other one beats in both time and error, fastest first."""
+    front: list[Candidate] = []
+    for candidate in sorted(candidates, key=lambda c: (c.time, c.error)):
+        if not front or candidate.error < front[-1].error:
+            front.append(candidate)
+    return front
+
+
+def front_plot(candidates: Sequence[Candidate], chosen: Candidate | None, title: str, axes: tuple[str, str]) -> bytes:
+    """PNG: error against time, a colour a kind, the Pareto front as a line, the chosen one in a ring."""
+    figure = Figure(figsize=(9.5, 6.0), layout="constrained")
+    ax = figure.subplots()
+    kinds = list(dict.fromkeys(c.kind for c in candidates))
+    for number, kind in enumerate(kinds):
+        mine = [c for c in candidates if c.kind == kind]
+        style = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number // len(COLOURS) % len(MARKERS)]}
+        ax.plot([c.time for c in mine], [c.error for c in mine], linestyle="", markersize=8, label=kind, **style)
+    front = pareto_front(candidates)
+    ax.step([c.time for c in front], [c.error for c in front], where="post", color="black", linewidth=1, zorder=0)
+    ax.plot([], [], color="black", linewidth=1, label="Pareto front")
+    if chosen is not None:
+        ring = {"marker": "o", "markersize": 17, "fillstyle": "none", "color": "black", "linestyle": ""}
+        ax.plot([chosen.time], [chosen.error], label="recommended", **ring)
+    for number, c in enumerate(front, start=1):
+        ax.annotate(str(number), (c.time, c.error), (7, 6), textcoords="offset points", fontsize=9, weight="bold")
+    listed = "\n".join(f"{number}  {c.name}" for number, c in enumerate(front, start=1))
+    ax.text(0.985, 0.98, listed, transform=ax.transAxes, ha="right", va="top", fontsize=8, linespacing=1.5)
+    ax.set(xscale="log", xlabel=axes[0], ylabel=axes[1])
+    ax.grid(True, which="major", alpha=0.3)
+    ax.set_title(title, fontsize=11)
+    figure.legend(loc="outside lower center", ncols=min(5, len(kinds) + 2), fontsize=8, frameon=False)
+    out = io.BytesIO()
+    figure.savefig(out, dpi=110, format="png")
+    return out.getvalue()
+
+
+def write_tune(
+    folder: Path,
+    tuned: str,
+    title: str,
+    candidates: Sequence[Candidate],
+    chosen: Candidate,
+    axes: tuple[str, str],
+    notes: Sequence[str],
+) -> Path:
+    """Write tune-X.json, .png and .html; each file appears whole or not at all.
+
+    Args:
+        folder: made if need be.
+        tuned: X, what was tuned.
+        title: over picture and page.
+        candidates: all of them.
+        chosen: the recommended one.
+        axes: names of time and error.
+        notes: paragraphs of the page; one of several lines is shown as it is.
+
+    Returns:
+        Path of the JSON file, which `viewcell bake --settings` takes.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    picture = front_plot(candidates, chosen, title, axes)
+    head = ("setting", *axes, *candidates[0].numbers)
+    rows = [(c.name, f"{c.time:,.2f}", f"{c.error:,.4f}", *map(str, c.numbers.values())) for c in candidates]
+    content = {
+        "tuned": tuned,
+        "settings": chosen.settings or {},
+        "recommended": chosen.name,
+        "candidates": [
+            {"name": c.name, axes[0]: c.time, axes[1]: c.error, **c.numbers, "settings": c.settings} for c in candidates
+        ],
+    }
+    files = {
+        f"tune-{tuned}.png": picture,
+        f"tune-{tuned}.html": _page(title, picture, head, rows, notes).encode(),
+        f"tune-{tuned}.json": (json.dumps(content, indent=1) + "\n").encode(),
+    }
+    write_files(folder, lambda: files)
+    return folder / f"tune-{tuned}.json"
+
+
+def _page(title: str, picture: bytes, head: Sequence[str], rows: Sequence[tuple], notes: Sequence[str]) -> str:
+    """HTML in one file."""
+    cells = "".join(f"<th>{html.escape(text)}</th>" for text in head)
+    body = "".join("<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in row) + "</tr>" for row in rows)
+    tags = ["pre" if "\n" in note else "p" for note in notes]
+    said = "".join(f"<{tag}>{html.escape(note)}</{tag}>" for tag, note in zip(tags, notes, strict=True) if note)
+    image = base64.b64encode(picture).decode()
+    return (
+        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
+        f"<style>{STYLE}</style></head><body><h1>{html.escape(title)}</h1>"
+        f'<img alt="{html.escape(title)}" src="data:image/png;base64,{image}">'
+        f"<table><tr>{cells}</tr>{body}</table>{said}</body></html>\n"
+    )

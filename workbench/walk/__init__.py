@@ -1,0 +1,1 @@
+"""Walk through a bake: paths, and a renderer in software."""
