@@ -8,18 +8,17 @@ from importlib import import_module
 __version__ = "0.1.0"
 
 _HOME = {
-    "Bake": "viewcell.data.store.database",
+    "Bake": "viewcell.workbench.baked",
     "InputError": "viewcell.data.errors",
     "Scene": "viewcell.data.scene",
     "Verdict": "viewcell.data.verdict",
     "assert_conservative": "viewcell.workbench.check.run",
     "bake": "viewcell.workbench.bake.run",
     "check": "viewcell.workbench.check.run",
-    "load": "viewcell.data.store.database",
+    "load": "viewcell.workbench.baked",
     "make_office": "viewcell.data.buildings.office",
     "read": "viewcell.data.readers",
     "report": "viewcell.workbench.report.run",
-    "verify": "viewcell.workbench.verify",
 }
 
 __all__ = [
@@ -34,7 +33,6 @@ __all__ = [
     "make_office",
     "read",
     "report",
-    "verify",
 ]
 
 

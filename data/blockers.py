@@ -12,8 +12,7 @@ import numpy as np
 
 from .graph import OTHER_AXES, CellGraph
 from .hierarchy import Hierarchy, build_hierarchy
-from .opaque import OpaquePlanes
-from .subdivide import PlaneIndex
+from .opaque import NO_PLANES, OpaquePlanes
 
 
 @dataclass
@@ -38,9 +37,9 @@ def find_blockers(graph: CellGraph, opaque: OpaquePlanes | None = None) -> Block
         graph: cells and portals.
         opaque: opaque rectangles, on cell faces or not; None for a bare graph, whose faces say it all.
     """
-    opaque = opaque or OpaquePlanes([np.zeros((0, 2, 3), np.int32)] * 3, 0.0, 0.0)
+    opaque = opaque or NO_PLANES
     pieces, axes = [], []
-    index = PlaneIndex(opaque)
+    index = opaque.index
     for axis in range(3):
         planes = np.unique(np.concatenate([graph.cells[:, :, axis].ravel(), opaque.boxes[axis][:, 0, axis]]))
         low = np.argsort(graph.cells[:, 0, axis], kind="stable")

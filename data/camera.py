@@ -42,8 +42,7 @@ class Screen:
     def __post_init__(self) -> None:
         if min(self.width, self.height) < 1 or self.width * self.height > PIXELS_MOST:
             raise InputError(
-                f"resolution: expected at least 1x1 and at most {PIXELS_MOST:,} pixels, "
-                f"found {self.width}x{self.height}"
+                f"image: expected at least 1x1 and at most {PIXELS_MOST:,} pixels, found {self.width}x{self.height}"
             )
         if not 0 < self.fov_deg < 180:
             raise InputError(f"fov: expected degrees between 0 and 180, found {self.fov_deg}")

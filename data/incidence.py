@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .ragged import places_of
 from .scene import Scene
 
 CHUNK = 200_000
@@ -34,8 +35,7 @@ class Incidence:
 
 def populate(scene: Scene, cells: np.ndarray) -> Incidence:
     """Incidence of all objects, opaque or not, with the cells [grid steps], shape (n, 2, 3), int32."""
-    triangles, owners = scene.triangles()
-    starts = np.searchsorted(owners, np.arange(len(scene.objects) + 1))
+    triangles, starts = scene.triangles()[0], scene.triangle_starts
     bounds = scene.object_bounds()
     cell, object_id, whole = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0, bool)]
     for index in np.flatnonzero(np.diff(starts)):
@@ -74,7 +74,7 @@ def _clip_rows(triangles: np.ndarray, starts: np.ndarray, cells: np.ndarray, obj
         stop = max(begin + 1, int(np.searchsorted(ends, ends[begin] - sizes[begin] + CHUNK)))
         part = sizes[begin:stop]
         row = begin + np.repeat(np.arange(len(part)), part)
-        t = np.arange(len(row)) - np.repeat(np.cumsum(part) - part, part) + starts[objects[row]]
+        t = places_of(starts[objects[begin:stop]], part)
         near = (triangles[t].min(axis=1) <= cells[row, 1]).all(axis=1)
         near &= (triangles[t].max(axis=1) >= cells[row, 0]).all(axis=1)
         row, t = row[near], t[near]

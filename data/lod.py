@@ -11,6 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from .errors import InputError
+from .ragged import starts_of
 from .scene import Definition, Instance, Mesh, Scene
 from .solids import is_closed
 
@@ -182,34 +183,5 @@ def object_errors(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     linear = np.stack([placed.transform[:3, :3] for placed in scene.objects])
     # Above the rounding of the singular values.
     stretch = np.linalg.norm(linear, ord=2, axis=(1, 2)) * (1 + 2.0**-40)
-    starts = np.concatenate([[0], np.cumsum([len(levels[i]) for i in of])]).astype(np.int64)
+    starts = starts_of([len(levels[i]) for i in of])
     return np.concatenate([np.array(levels[i]) * s for i, s in zip(of, stretch, strict=True)]), starts
-
-
-def drawn_bounds(scene: Scene, levels: np.ndarray | None = None) -> np.ndarray:
-    """Box that holds each object as drawn at a level: that of its level 0, grown by the level's deviation.
-
-    Potentially visible sets are of objects at level 0. A coarser level may stick out of that by `error_m`: whoever
-    tests what is drawn, rather than what is modelled, has to test this box.
-
-    Args:
-        scene: whose coarser levels have bounds in `error_m`.
-        levels: of each object, shape (objects,), int, -1 for the coarsest, which is the default for all.
-
-    Returns:
-        [grid steps], shape (objects, 2, 3), int64; empty objects get min > max.
-
-    Raises:
-        InputError: an object has no such level.
-    """
-    errors, starts = object_errors(scene)
-    counts = np.diff(starts)
-    levels = np.full(len(counts), -1) if levels is None else np.asarray(levels)
-    if levels.shape != counts.shape or ((levels < -1) | (levels >= counts)).any():
-        raise InputError(f"levels: expected a level of each of {len(counts)} objects, or -1, found {levels.tolist()}")
-    steps = np.ceil(errors[starts[:-1] + np.where(levels < 0, counts - 1, levels)] / scene.grid_m + 1.0)
-    bounds = scene.object_bounds()
-    full = (bounds[:, 0] <= bounds[:, 1]).all(axis=1)
-    # One step more than the deviation: both levels are snapped, each by half a step an axis.
-    bounds[full] += steps[full, None, None].astype(np.int64) * np.array([[-1], [1]])
-    return bounds

@@ -12,6 +12,7 @@ import numpy as np
 
 from .hierarchy import build_levels
 from .incidence import CHUNK, clip_bounds
+from .ragged import owners_of, places_of
 from .scene import Scene
 
 # Pieces are no smaller than this, and at most PIECES along an axis of their object.
@@ -38,6 +39,11 @@ class Occludees:
     pieces: np.ndarray
     starts: np.ndarray
 
+    @property
+    def owners(self) -> np.ndarray:
+        """Object of each piece, shape (pieces,), int64."""
+        return owners_of(self.starts)
+
 
 def find_occludees(scene: Scene) -> Occludees:
     """Occludees of all objects of a scene, opaque or not."""
@@ -60,7 +66,7 @@ def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     first = np.searchsorted(owner, np.arange(len(bounds) + 1))
     count = np.diff(first)[models]
     objects = np.repeat(np.arange(len(bounds)), count)
-    row = np.arange(len(objects)) - np.repeat(np.cumsum(count) - count, count) + first[models[objects]]
+    row = places_of(first[models], count)
     shift = bounds[objects, 0] - bounds[models[objects], 0]
     return (boxes[row] + shift[:, None]).astype(np.int32), objects
 
@@ -91,7 +97,7 @@ def _cut(triangles: np.ndarray, owners: np.ndarray, bounds: np.ndarray, least: i
         span = last - first + 1
         count = span.prod(axis=1)
         row = np.repeat(np.arange(len(t)), count)
-        rest = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        rest = places_of(0, count)
         place = np.empty((len(row), 3), np.int64)
         for i in range(3):
             place[:, i] = first[row, i] + rest % span[row, i]

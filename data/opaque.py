@@ -7,6 +7,7 @@ the true surface, so nothing is ever called blocked that is not.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,32 @@ OBLIQUE_STEPS = 12
 OBLIQUE_STEP = 64
 # What comes within so many grid steps of an edge that was rounded to the grid is not called covered.
 ROUNDED_REACH = 2
+
+
+class PlaneIndex:
+    """Opaque rectangles of each plane, looked up by axis and coordinate."""
+
+    def __init__(self, boxes_by_axis: list[np.ndarray]) -> None:
+        self._planes: dict[tuple[int, int], np.ndarray] = {}
+        for axis, boxes in enumerate(boxes_by_axis):
+            if not len(boxes):
+                continue
+            planes, starts = np.unique(boxes[:, 0, axis], return_index=True)
+            for k, part in zip(planes, np.split(boxes, starts[1:]), strict=True):
+                self._planes[axis, int(k)] = part[:, :, OTHER_AXES[axis]].astype(np.int64)
+
+    def rectangles(self, axis: int, k: int) -> np.ndarray:
+        """Opaque rectangles of a plane, shape (n, 2, 2), int64."""
+        return self._planes.get((axis, k), np.zeros((0, 2, 2), np.int64))
+
+    def is_open(self, face: tuple[int, ...]) -> bool:
+        """Whether nothing opaque overlaps the face (axis, side, plane, u low, u high, v low, v high)."""
+        axis, _, k, u0, u1, v0, v1 = face
+        r = self._planes.get((axis, k))
+        if r is None:
+            return True
+        hit = (r[:, 0, 0] < u1) & (r[:, 1, 0] > u0) & (r[:, 0, 1] < v1) & (r[:, 1, 1] > v0)
+        return not hit.any()
 
 
 @dataclass
@@ -33,6 +60,14 @@ class OpaquePlanes:
     boxes: list[np.ndarray]
     axial_area: float
     lost_area: float
+
+    @cached_property
+    def index(self) -> PlaneIndex:
+        """The rectangles of each plane."""
+        return PlaneIndex(self.boxes)
+
+
+NO_PLANES = OpaquePlanes([np.zeros((0, 2, 3), np.int32)] * 3, 0.0, 0.0)
 
 
 def opaque_planes(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS) -> OpaquePlanes:

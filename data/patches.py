@@ -26,6 +26,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from .errors import InputError
+from .ragged import starts_of
 
 # Coordinates are below this [grid steps].
 LIMIT = 2**24
@@ -205,7 +206,7 @@ def _collect(
         discs.append(places[members])
     return Patches(
         np.concatenate([np.zeros((0, 3)), *outlines]).astype(np.int32),
-        np.concatenate([[0], np.cumsum([len(outline) for outline in outlines])]).astype(np.int64),
+        starts_of([len(outline) for outline in outlines]),
         np.array(boxes, np.int32).reshape(-1, 2, 3),
         np.array(normals).reshape(-1, 3),
         np.array(depths).reshape(-1, 2),
@@ -395,3 +396,34 @@ class _Mesh:
                 out.append(b)
             a = b
         return out
+
+
+def rectangle_outlines(boxes: np.ndarray) -> Patches:
+    """Flat axial boxes, shape (n, 2, 3), int32, as outlines: sections of solids serve eyes outside them."""
+    count = len(boxes)
+    axis = (boxes[:, 1] == boxes[:, 0]).argmax(axis=1)
+    u, v = ((axis + step) % 3 for step in (1, 2))
+    rows = np.arange(count)
+    corners = np.repeat(boxes[:, :1], 4, axis=1)
+    for corner, (at_u, at_v) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
+        corners[rows, corner, u] = boxes[rows, at_u, u]
+        corners[rows, corner, v] = boxes[rows, at_v, v]
+    normal = np.zeros((count, 3))
+    normal[rows, axis] = 1
+    size = (boxes[:, 1] - boxes[:, 0]).astype(float)
+    return Patches(
+        corners.reshape(-1, 3).astype(np.int32),
+        np.arange(0, 4 * count + 1, 4, dtype=np.int64),
+        boxes.astype(np.int32),
+        normal,
+        np.repeat(boxes[rows, 0, axis].astype(float)[:, None], 2, axis=1),
+        np.full(count, -1, np.int32),
+        size[rows, u] * size[rows, v],
+    )
+
+
+def join_outlines(first: Patches, second: Patches) -> Patches:
+    """Both sets of outlines as one."""
+    names = ("corners", "boxes", "normal", "depth", "owner", "area")
+    joined = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
+    return Patches(starts=np.concatenate([first.starts, first.starts[-1] + second.starts[1:]]), **joined)

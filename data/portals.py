@@ -7,7 +7,6 @@ import numpy as np
 
 from .graph import OTHER_AXES, CellGraph
 from .opaque import OpaquePlanes, decompose
-from .subdivide import PlaneIndex
 
 
 def find_portals(cells: np.ndarray, opaque: OpaquePlanes) -> CellGraph:
@@ -20,7 +19,7 @@ def find_portals(cells: np.ndarray, opaque: OpaquePlanes) -> CellGraph:
     Returns:
         The graph, with no cell marked inhabitable and empty names.
     """
-    planes = PlaneIndex(opaque)
+    planes = opaque.index
     ends, axes, boxes = [], [], []
     for axis in range(3):
         u, v = OTHER_AXES[axis]

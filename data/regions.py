@@ -11,13 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from .blockers import maximal_rectangles, paint
+from .blockers import Blockers, maximal_rectangles, paint
 from .graph import OTHER_AXES
 from .hierarchy import Hierarchy, build_hierarchy
 from .opaque import OpaquePlanes, edge_rectangles
-from .scene import Role, Scene
-from .solids import closed_elements
-from .subdivide import PlaneIndex
 
 # Regions and pieces of furniture below this hide little and would fill the hierarchy.
 LEAST_M2 = 0.5
@@ -57,25 +54,33 @@ class Regions:
     region: np.ndarray
     hierarchy: Hierarchy
 
+    @property
+    def blockers(self) -> Blockers:
+        """The rectangles as a target search wants them."""
+        return Blockers(self.boxes, self.axis[self.region], self.hierarchy)
 
-def find_regions(scene: Scene, opaque: OpaquePlanes, *, sections: bool = True) -> Regions:
+
+def find_regions(
+    opaque: OpaquePlanes, occluders: list[np.ndarray], details: list[np.ndarray], grid_m: float
+) -> Regions:
     """Regions of every plane that holds enough opaque surface, or the middle of a thin or oblique closed element.
 
     Args:
-        scene: the model.
-        opaque: its opaque rectangles (solvers/visibility/engine.py adds those of furniture).
-        sections: cut closed elements too.
+        opaque: opaque rectangles.
+        occluders: triangles (m, 3, 3) of each closed element that is cut, int32.
+        details: likewise of closed elements that are cut only if they are boxes and large enough.
+        grid_m: grid step [m].
     """
-    least = LEAST_M2 / scene.grid_m**2
-    elements = _Sections(scene if sections else Scene([], []), least)
-    index = PlaneIndex(opaque)
+    least = LEAST_M2 / grid_m**2
+    elements = _Sections(occluders, details, least, ROUND_M2 / grid_m**2)
+    index = opaque.index
     found = []
     for axis in range(3):
         uv = OTHER_AXES[axis]
         extent = (opaque.boxes[axis][:, 1] - opaque.boxes[axis][:, 0]).astype(float)[:, uv]
         planes, place = np.unique(opaque.boxes[axis][:, 0, axis], return_inverse=True)
         area = np.bincount(place, extent.prod(axis=1), minlength=len(planes))
-        middles = elements.middles(axis, round(THIN_M / scene.grid_m))
+        middles = elements.middles(axis, round(THIN_M / grid_m))
         for k in np.unique(np.concatenate([planes[area >= least], middles])):
             rectangles = np.concatenate([index.rectangles(axis, int(k)), elements.rectangles(axis, int(k))])
             for region in _plane_regions(rectangles, least):
@@ -141,13 +146,14 @@ def _pack(found: list[tuple]) -> Regions:
 class _Sections:
     """Sections of closed elements, each computed once where the element is a prism along the axis."""
 
-    def __init__(self, scene: Scene, least: float) -> None:
-        solids = closed_elements(scene, Role.OCCLUDER) + [
-            (number, triangles)
-            for number, triangles in closed_elements(scene, Role.DETAIL)
+    def __init__(
+        self, occluders: list[np.ndarray], details: list[np.ndarray], least: float, least_round: float
+    ) -> None:
+        self._triangles = occluders + [
+            triangles
+            for triangles in details
             if _is_box(triangles) and np.sort(np.ptp(triangles, axis=(0, 1)).astype(float))[1:].prod() >= least
         ]
-        self._triangles = [triangles for _, triangles in solids]
         self._boxes = np.array([[t.min(axis=(0, 1)), t.max(axis=(0, 1))] for t in self._triangles], np.int64)
         self._boxes = self._boxes.reshape(-1, 2, 3)
         self._solid_box = np.array([_is_box(t) for t in self._triangles], bool)
@@ -155,7 +161,7 @@ class _Sections:
         size = (self._boxes[:, 1] - self._boxes[:, 0]).astype(float)
         faces = np.stack([size[:, OTHER_AXES[axis]].prod(axis=1) for axis in range(3)], axis=1)
         straight = np.array([((_normals(t) != 0).sum(axis=1) == 1).all() for t in self._triangles], bool)
-        self._large = (faces >= ROUND_M2 / scene.grid_m**2) | straight[:, None]
+        self._large = (faces >= least_round) | straight[:, None]
         self._middle = self._boxes.sum(axis=1) // 2
         self._heights: dict[tuple[int, int], np.ndarray] = {}
         self._cut: dict[tuple[int, int, int], tuple[np.ndarray, bool]] = {}

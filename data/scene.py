@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import InputError
+from .ragged import starts_of
 
 GRID_M = 2.0**-10
 # Coordinate differences stay below 2**25, so the products that the stabbing kernel forms are exact in float64.
@@ -26,6 +27,10 @@ class Role(StrEnum):
     OCCLUDER = "occluder"
     DETAIL = "detail"
     TRANSPARENT = "transparent"
+
+
+# What stops sightlines.
+OPAQUE = (Role.OCCLUDER, Role.DETAIL)
 
 
 @dataclass(frozen=True)
@@ -133,7 +138,7 @@ class Scene:
         finest = [shape.lods[0] for shape in self.definitions]
         of = np.array([placed.definition_id for placed in self.objects], np.int64)
         sizes = np.array([len(mesh.faces) for mesh in finest], np.int64)[of]
-        starts = np.concatenate([[0], np.cumsum(sizes)])
+        starts = starts_of(sizes)
         triangles, kept, worst = np.empty((starts[-1], 3, 3), np.int32), np.ones(starts[-1], bool), 0.0
         for definition_id in np.unique(of):
             mesh, same = finest[definition_id], np.flatnonzero(of == definition_id)
@@ -163,17 +168,36 @@ class Scene:
             raise
         return snapped, float(np.abs(world - snapped * self.grid_m).max(initial=0.0))
 
-    def triangles(self) -> tuple[np.ndarray, np.ndarray]:
-        """All snapped, non-degenerate finest-level triangles and their object ids.
+    def triangles(self, *roles: Role) -> tuple[np.ndarray, np.ndarray]:
+        """Snapped, non-degenerate finest-level triangles of objects of the roles, by default all, and their object ids.
 
         Returns:
             Triangles [grid steps], shape (m, 3, 3), int32, in object order; object_id of each, shape (m,), int32.
         """
-        return self._flat[0], self._flat[1]
+        triangles, owners, _ = self._flat
+        if not roles:
+            return triangles, owners
+        wanted = self.object_mask(*roles)[owners]
+        return triangles[wanted], owners[wanted]
+
+    @cached_property
+    def triangle_starts(self) -> np.ndarray:
+        """Triangles of object o are triangle_starts[o]:triangle_starts[o + 1] of all, shape (objects + 1,), int64."""
+        return np.searchsorted(self._flat[1], np.arange(len(self.objects) + 1))
+
+    @property
+    def triangle_counts(self) -> np.ndarray:
+        """Triangles of each object, shape (objects,), int64."""
+        return np.diff(self.triangle_starts)
 
     def object_mask(self, *roles: Role) -> np.ndarray:
         """Objects that have one of the roles, shape (objects,), bool."""
         return np.array([placed.role in roles for placed in self.objects], bool).reshape(len(self.objects))
+
+    def bounds(self) -> np.ndarray:
+        """Low and high corner of all triangles [grid steps], shape (2, 3), int64."""
+        triangles, _ = self.triangles()
+        return np.array([triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))], np.int64)
 
     def object_bounds(self) -> np.ndarray:
         """Snapped box of each object [grid steps], shape (objects, 2, 3), int64; empty objects get min > max."""

@@ -5,7 +5,7 @@ Only closed elements count, each alone: an open ceiling would make everything un
 
 import numpy as np
 
-from .scene import GRID_LIMIT, Role, Scene
+from .scene import GRID_LIMIT, OPAQUE, Role, Scene
 
 SHIFT = 2 * GRID_LIMIT
 
@@ -16,19 +16,9 @@ def closed_elements(scene: Scene, *roles: Role) -> list[tuple[int, np.ndarray]]:
     Returns:
         (object_id, triangles (m, 3, 3) int32) of each.
     """
-    # Several phases of a bake ask; a scene does not change once it is read.
-    known = scene.__dict__.get("_closed_elements")
-    if known is None:
-        known = scene.__dict__["_closed_elements"] = _opaque_closed(scene)
-    wanted = scene.object_mask(*(roles or (Role.OCCLUDER, Role.DETAIL)))
-    return [(object_id, part) for object_id, part in known if wanted[object_id]]
-
-
-def _opaque_closed(scene: Scene) -> list[tuple[int, np.ndarray]]:
-    triangles, owners = scene.triangles()
-    starts = np.searchsorted(owners, np.arange(len(scene.objects) + 1))
-    found = []
-    for object_id in np.flatnonzero(scene.object_mask(Role.OCCLUDER, Role.DETAIL)):
+    triangles, _ = scene.triangles()
+    starts, found = scene.triangle_starts, []
+    for object_id in np.flatnonzero(scene.object_mask(*(roles or OPAQUE))):
         part = triangles[starts[object_id] : starts[object_id + 1]]
         if len(part) >= 4 and is_closed(part):
             found.append((int(object_id), part))

@@ -102,7 +102,7 @@ def merge(leaves: np.ndarray, opaque: OpaquePlanes) -> np.ndarray:
     Returns:
         Boxes with the same union, shape (m, 2, 3), int32.
     """
-    planes = PlaneIndex(opaque)
+    planes = opaque.index
     boxes = [tuple(box) for box in leaves.reshape(-1, 6).tolist()]
     alive = [True] * len(boxes)
     faces: dict[tuple[int, ...], int] = {}
@@ -143,29 +143,3 @@ def merge(leaves: np.ndarray, opaque: OpaquePlanes) -> np.ndarray:
             alive.append(True)
             offer(len(boxes) - 1)
     return np.array([box for box, keep in zip(boxes, alive, strict=True) if keep], np.int32).reshape(-1, 2, 3)
-
-
-class PlaneIndex:
-    """Opaque rectangles of each plane, looked up by axis and coordinate."""
-
-    def __init__(self, opaque: OpaquePlanes) -> None:
-        self._planes: dict[tuple[int, int], np.ndarray] = {}
-        for axis, boxes in enumerate(opaque.boxes):
-            if not len(boxes):
-                continue
-            planes, starts = np.unique(boxes[:, 0, axis], return_index=True)
-            for k, part in zip(planes, np.split(boxes, starts[1:]), strict=True):
-                self._planes[axis, int(k)] = part[:, :, OTHER_AXES[axis]].astype(np.int64)
-
-    def rectangles(self, axis: int, k: int) -> np.ndarray:
-        """Opaque rectangles of a plane, shape (n, 2, 2), int64."""
-        return self._planes.get((axis, k), np.zeros((0, 2, 2), np.int64))
-
-    def is_open(self, face: tuple[int, ...]) -> bool:
-        """Whether nothing opaque overlaps the face (axis, side, plane, u low, u high, v low, v high)."""
-        axis, _, k, u0, u1, v0, v1 = face
-        r = self._planes.get((axis, k))
-        if r is None:
-            return True
-        hit = (r[:, 0, 0] < u1) & (r[:, 1, 0] > u0) & (r[:, 0, 1] < v1) & (r[:, 1, 1] > v0)
-        return not hit.any()

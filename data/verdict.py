@@ -1,11 +1,19 @@
 """The three answers to "can this be seen?"."""
 
-from enum import StrEnum
+from enum import IntEnum
 
 
-class Verdict(StrEnum):
-    """VISIBLE has a witness sightline, HIDDEN has a proof, UNKNOWN has neither and is kept as potential."""
+class Verdict(IntEnum):
+    """VISIBLE has a witness sightline, HIDDEN has a proof, UNKNOWN has neither and is kept as potential.
 
-    VISIBLE = "visible"
-    HIDDEN = "hidden"
-    UNKNOWN = "unknown"
+    Arrays and kernels hold the numbers, tables of a bake the words.
+    """
+
+    HIDDEN = 0
+    VISIBLE = 1
+    UNKNOWN = 2
+
+    @property
+    def word(self) -> str:
+        """As tables of a bake and messages have it."""
+        return self.name.lower()

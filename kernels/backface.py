@@ -16,9 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ..data.errors import InputError
-from ..data.scene import Scene
-from ..data.solids import closed_elements
-from .launch import SlotSizes, run_sliced, vectors
+from .launch import CPU, Device, launch_rows
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -40,14 +38,14 @@ LOW_MASK = wp.constant(wp.int64(2**26 - 1))
 class ConeTree:
     """Nodes of all hierarchies, and the leaves' triangles; see `NormalCones`."""
 
-    lo: wp.array(dtype=wp.vec3i)
-    hi: wp.array(dtype=wp.vec3i)
-    cones: wp.array(dtype=wp.vec4d)
-    links: wp.array(dtype=wp.vec2i)
-    ranges: wp.array(dtype=wp.vec2i)
-    roots: wp.array(dtype=int)
-    normals: wp.array(dtype=wp.vec3l)
-    anchors: wp.array(dtype=wp.vec3i)
+    lo: wp.array[wp.vec3i]
+    hi: wp.array[wp.vec3i]
+    cones: wp.array[wp.vec4d]
+    links: wp.array[wp.vec2i]
+    ranges: wp.array[wp.vec2i]
+    roots: wp.array[int]
+    normals: wp.array[wp.vec3l]
+    anchors: wp.array[wp.vec3i]
 
 
 @wp.func
@@ -90,42 +88,38 @@ def is_back_facing(normal: wp.vec3l, anchor: wp.vec3i, low: wp.vec3i, high: wp.v
 @wp.kernel
 def _count(
     tree: ConeTree,
-    boxes_low: wp.array(dtype=wp.vec3i),
-    boxes_high: wp.array(dtype=wp.vec3i),
-    rows: wp.array(dtype=wp.vec2i),
+    boxes_low: wp.array[wp.vec3i],
+    boxes_high: wp.array[wp.vec3i],
+    rows: wp.array[wp.vec2i],
     first: int,
-    last: int,
-    slots: int,
-    removed_out: wp.array(dtype=int),
+    removed_out: wp.array[int],
 ):
     row = first + wp.tid()
-    while row < last:
-        low = boxes_low[rows[row][0]]
-        high = boxes_high[rows[row][0]]
-        near = wp.vec3d(f64(low[0]), f64(low[1]), f64(low[2]))
-        far = wp.vec3d(f64(high[0]), f64(high[1]), f64(high[2]))
-        centre = (near + far) * f64(0.5)
-        removed = int(0)
-        node = int(tree.roots[rows[row][1]])
-        while node >= 0:
-            lo = wp.vec3d(f64(tree.lo[node][0]), f64(tree.lo[node][1]), f64(tree.lo[node][2]))
-            hi = wp.vec3d(f64(tree.hi[node][0]), f64(tree.hi[node][1]), f64(tree.hi[node][2]))
-            cone = tree.cones[node]
-            span = tree.ranges[node]
-            after = tree.links[node][1]
-            if turned_away(cone, near - hi, far - lo):
-                removed += span[1] - span[0]
-            # What faces the cell's centre is not turned away from all of it; a vector negated is a cone negated.
-            elif not turned_away(cone, lo - centre, hi - centre):
-                if tree.links[node][0] >= 0:
-                    after = tree.links[node][0]
-                else:
-                    for k in range(span[0], span[1]):
-                        if is_back_facing(tree.normals[k], tree.anchors[k], low, high):
-                            removed += 1
-            node = after
-        removed_out[row] = removed
-        row += slots
+    low = boxes_low[rows[row][0]]
+    high = boxes_high[rows[row][0]]
+    near = wp.vec3d(f64(low[0]), f64(low[1]), f64(low[2]))
+    far = wp.vec3d(f64(high[0]), f64(high[1]), f64(high[2]))
+    centre = (near + far) * f64(0.5)
+    removed = int(0)
+    node = int(tree.roots[rows[row][1]])
+    while node >= 0:
+        lo = wp.vec3d(f64(tree.lo[node][0]), f64(tree.lo[node][1]), f64(tree.lo[node][2]))
+        hi = wp.vec3d(f64(tree.hi[node][0]), f64(tree.hi[node][1]), f64(tree.hi[node][2]))
+        cone = tree.cones[node]
+        span = tree.ranges[node]
+        after = tree.links[node][1]
+        if turned_away(cone, near - hi, far - lo):
+            removed += span[1] - span[0]
+        # What faces the cell's centre is not turned away from all of it; a vector negated is a cone negated.
+        elif not turned_away(cone, lo - centre, hi - centre):
+            if tree.links[node][0] >= 0:
+                after = tree.links[node][0]
+            else:
+                for k in range(span[0], span[1]):
+                    if is_back_facing(tree.normals[k], tree.anchors[k], low, high):
+                        removed += 1
+        node = after
+    removed_out[row] = removed
 
 
 @dataclass
@@ -153,17 +147,12 @@ class NormalCones:
     ranges: np.ndarray
     roots: np.ndarray
 
-    def tree(self, device: str) -> ConeTree:
+    def tree(self, device: Device) -> ConeTree:
         """Copy to a device."""
-        out = ConeTree()
-        out.lo, out.hi = (vectors(self.boxes[:, end], device) for end in (0, 1))
-        out.cones = wp.array(self.cones, dtype=wp.vec4d, device=device)
-        out.links = wp.array(self.links, dtype=wp.vec2i, device=device)
-        out.ranges = wp.array(self.ranges, dtype=wp.vec2i, device=device)
-        out.roots = wp.array(self.roots, dtype=int, device=device)
-        out.normals = wp.array(integer_normals(self.triangles), dtype=wp.vec3l, device=device)
-        out.anchors = vectors(self.triangles[:, 0], device)
-        return out
+        lo, hi = (device.corners(self.boxes[:, end]) for end in (0, 1))
+        normals, anchors = integer_normals(self.triangles), device.corners(self.triangles[:, 0])
+        nodes = {"lo": lo, "hi": hi, "cones": self.cones, "links": self.links, "ranges": self.ranges}
+        return device.struct(ConeTree, **nodes, roots=self.roots, normals=normals, anchors=anchors)
 
 
 def integer_normals(triangles: np.ndarray) -> np.ndarray:
@@ -172,20 +161,22 @@ def integer_normals(triangles: np.ndarray) -> np.ndarray:
     return np.cross(a, b)
 
 
-def build_cones(scene: Scene) -> NormalCones:
+def build_cones(elements: list[tuple[int, np.ndarray]], counts: np.ndarray) -> NormalCones:
     """Normal cones of the opaque shells that are closed and turned outwards; no other triangle may be culled.
 
     A shell (triangles joined by edges) of an element whose directed edges all pair off counts if its volume is
     positive. Seen from outside such a shell, a triangle's back is behind another triangle of it. A shell that passes
     through itself and turns inside out on the way is not recognised.
+
+    Args:
+        elements: (object_id, triangles (m, 3, 3) int32) of each closed opaque element, in object order.
+        counts: triangles of each object, those that may not be culled included, shape (objects,), int.
     """
-    elements = closed_elements(scene)
     owners = np.concatenate(
         [np.full(len(part), owner, np.int32) for owner, part in elements] or [np.zeros(0, np.int32)]
     )
     triangles = np.concatenate([part for _, part in elements] or [np.zeros((0, 3, 3), np.int32)])
     kept = _outward(triangles, owners)
-    counts = np.bincount(scene.triangles()[1], minlength=len(scene.objects))
     return _hierarchy(triangles[kept], owners[kept], counts)
 
 
@@ -284,7 +275,7 @@ def _cones(normals: np.ndarray, order: np.ndarray, ranges: np.ndarray) -> np.nda
 
 
 def launch_backface(
-    cones: NormalCones, boxes: np.ndarray, rows: np.ndarray, *, threads: int = 1, device: str = "cpu"
+    cones: NormalCones, boxes: np.ndarray, rows: np.ndarray, *, device: Device = CPU
 ) -> tuple[np.ndarray, np.ndarray]:
     """Count the triangles of objects that are back-facing from everywhere in a view cell.
 
@@ -292,8 +283,7 @@ def launch_backface(
         cones: from `build_cones`.
         boxes: view cells [grid steps], shape (cells, 2, 3), int32, |coordinate| < 2**24.
         rows: (cell, object), shape (n, 2), int.
-        threads: CPU threads.
-        device: Warp device.
+        device: where to.
 
     Returns:
         Triangles removed, shape (n,), int32: exactly those of closed outward shells whose planes have the closed cell
@@ -309,15 +299,8 @@ def launch_backface(
     limits = (len(boxes), len(cones.roots))
     if len(rows) and ((rows < 0).any() or (rows.max(axis=0) >= limits).any()):
         raise InputError(f"rows: expected pairs below {limits}, found {rows.min(axis=0)} to {rows.max(axis=0)}")
-    tree = cones.tree(device)
-    low, high = (vectors(boxes[:, end], device) for end in (0, 1))
-    pairs = wp.array(rows, dtype=wp.vec2i, device=device)
-    removed = wp.zeros(len(rows), dtype=int, device=device)
-
-    def launch(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
-        inputs = [tree, low, high, pairs, first, last, slots, removed]
-        wp.launch(_count, dim=slots, inputs=inputs, device=device)
-
-    run_sliced(launch, len(rows), SlotSizes(1, 1), module=__name__, threads=threads, device=device)
+    low, high = (device.corners(boxes[:, end]) for end in (0, 1))
+    removed = device.zeros(len(rows), int)
+    launch_rows(_count, len(rows), [cones.tree(device), low, high, device.array(rows, wp.vec2i)], [removed], device)
     counts = removed.numpy()
     return counts, (counts > 0) & (counts == cones.counts[rows[:, 1]])

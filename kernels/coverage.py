@@ -16,7 +16,7 @@ import numpy as np
 import warp as wp
 
 from ..data.errors import InputError
-from .launch import SlotSizes, run_sliced
+from .launch import CPU, Device, launch_rows
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -36,37 +36,43 @@ FAR = wp.constant(wp.float64(1.0e300))
 
 @wp.struct
 class Polygons:
-    """Polygons of all maps, and what the first kernel finds out about them.
+    """Polygons of all maps: corners starts[i] to starts[i + 1], and the map that owns each."""
+
+    viewpoints: wp.array[wp.vec3d]
+    corners: wp.array[wp.vec3d]
+    starts: wp.array[int]
+    owners: wp.array[int]
+
+
+@wp.struct
+class Projected:
+    """What polygons look like from their viewpoints.
 
     `edges` row k: normal of the plane through the viewpoint and edge k, towards the polygon, and its bound. `planes`
     row p: g with 1 / depth >= g . direction on polygon p. `rows` row 6 p + face: pixel rows that may be covered.
     """
 
-    viewpoints: wp.array(dtype=wp.vec3d)
-    corners: wp.array(dtype=wp.vec3d)
-    starts: wp.array(dtype=int)
-    owners: wp.array(dtype=int)
-    edges: wp.array(dtype=wp.vec4d)
-    planes: wp.array(dtype=wp.vec3d)
-    rows: wp.array(dtype=wp.vec2i)
+    edges: wp.array[wp.vec4d]
+    planes: wp.array[wp.vec3d]
+    rows: wp.array[wp.vec2i]
 
 
 @wp.struct
 class Faces:
     """Faces that have an image: map * 6 + face of each, and the polygons that reach it, starts[i] to starts[i + 1]."""
 
-    keys: wp.array(dtype=int)
-    starts: wp.array(dtype=int)
-    polygons: wp.array(dtype=int)
+    keys: wp.array[int]
+    starts: wp.array[int]
+    polygons: wp.array[int]
 
 
 @wp.struct
 class Maps:
     """`slots` row map * 6 + face: its image, or -1; `images` row: 1 / depth, row by row, level 0, 1, ..."""
 
-    viewpoints: wp.array(dtype=wp.vec3d)
-    slots: wp.array(dtype=int)
-    images: wp.array2d(dtype=wp.float32)
+    viewpoints: wp.array[wp.vec3d]
+    slots: wp.array[int]
+    images: wp.array2d[wp.float32]
 
 
 @wp.func
@@ -134,54 +140,10 @@ def seen_through(p: wp.vec3d, q: wp.vec3d, axis: int, sign: f64) -> wp.vec2d:
     return out
 
 
-@wp.kernel
-def _project(polygons: Polygons, size: int, first: int, last: int, slots: int):
-    """Edge planes, depth plane and pixel rows of every polygon."""
-    p = first + wp.tid()
-    while p < last:
-        begin = polygons.starts[p]
-        end = polygons.starts[p + 1]
-        eye = polygons.viewpoints[polygons.owners[p]]
-        start = polygons.corners[begin] - eye
-        normal = wp.vec3d()
-        for k in range(begin + 1, end - 1):
-            a = polygons.corners[k] - polygons.corners[begin]
-            normal += wp.cross(a, polygons.corners[k + 1] - polygons.corners[begin])
-        turn = f64(1.0)
-        if wp.dot(normal, start) < f64(0.0):
-            turn = f64(-1.0)
-        normal = normal * turn
-        # Any normal will do, as long as every corner lies beyond the viewpoint and not beyond the farthest plane.
-        near = FAR
-        far = f64(0.0)
-        for k in range(begin, end):
-            r = polygons.corners[k] - eye
-            bound = absolute_sum(normal, r) * DOT_BOUND
-            near = wp.min(near, wp.dot(normal, r) - bound)
-            far = wp.max(far, wp.dot(normal, r) + bound)
-        usable = near > f64(0.0)
-        if usable:
-            polygons.planes[p] = normal * (DOWN / far)
-        for k in range(begin, end):
-            after = k + 1
-            if after == end:
-                after = begin
-            a = polygons.corners[k] - eye
-            b = polygons.corners[after] - eye
-            polygons.edges[k] = edge_plane(a, b, turn)
-            if polygons.corners[k] == polygons.corners[after]:
-                # A repeated corner bounds nothing.
-                polygons.edges[k] = wp.vec4d(f64(0.0), f64(0.0), f64(0.0), f64(-1.0))
-        for face in range(6):
-            rows = wp.vec2i(0, 0)
-            if usable:
-                rows = pixel_rows(polygons, begin, end, eye, face, size)
-            polygons.rows[6 * p + face] = rows
-        p += slots
-
-
 @wp.func
-def pixel_rows(polygons: Polygons, begin: int, end: int, eye: wp.vec3d, face: int, size: int) -> wp.vec2i:
+def pixel_rows(
+    polygons: Polygons, projected: Projected, begin: int, end: int, eye: wp.vec3d, face: int, size: int
+) -> wp.vec2i:
     """Pixel rows of a face that the polygon may cover; missing some would leave them open, no more."""
     axis = int(face // 2)
     sign = face_sign(face)
@@ -197,8 +159,8 @@ def pixel_rows(polygons: Polygons, begin: int, end: int, eye: wp.vec3d, face: in
         span = seen_through(polygons.corners[k] - eye, polygons.corners[after] - eye, axis, sign)
         least = wp.min(least, span[0])
         most = wp.max(most, span[1])
-        high_pole = high_pole and polygons.edges[k][v] > polygons.edges[k][3]
-        low_pole = low_pole and -polygons.edges[k][v] > polygons.edges[k][3]
+        high_pole = high_pole and projected.edges[k][v] > projected.edges[k][3]
+        low_pole = low_pole and -projected.edges[k][v] > projected.edges[k][3]
     # Seen between |u| <= depth, a polygon round the v axis has no end.
     if high_pole:
         most = f64(2.0)
@@ -211,8 +173,52 @@ def pixel_rows(polygons: Polygons, begin: int, end: int, eye: wp.vec3d, face: in
     return wp.vec2i(int(wp.floor(low)), int(wp.ceil(high)))
 
 
+@wp.kernel
+def _project(polygons: Polygons, size: int, first: int, projected_out: Projected):
+    """Edge planes, depth plane and pixel rows of every polygon."""
+    p = first + wp.tid()
+    begin = polygons.starts[p]
+    end = polygons.starts[p + 1]
+    eye = polygons.viewpoints[polygons.owners[p]]
+    start = polygons.corners[begin] - eye
+    normal = wp.vec3d()
+    for k in range(begin + 1, end - 1):
+        a = polygons.corners[k] - polygons.corners[begin]
+        normal += wp.cross(a, polygons.corners[k + 1] - polygons.corners[begin])
+    turn = f64(1.0)
+    if wp.dot(normal, start) < f64(0.0):
+        turn = f64(-1.0)
+    normal = normal * turn
+    # Any normal will do, as long as every corner lies beyond the viewpoint and not beyond the farthest plane.
+    near = FAR
+    far = f64(0.0)
+    for k in range(begin, end):
+        r = polygons.corners[k] - eye
+        bound = absolute_sum(normal, r) * DOT_BOUND
+        near = wp.min(near, wp.dot(normal, r) - bound)
+        far = wp.max(far, wp.dot(normal, r) + bound)
+    usable = near > f64(0.0)
+    if usable:
+        projected_out.planes[p] = normal * (DOWN / far)
+    for k in range(begin, end):
+        after = k + 1
+        if after == end:
+            after = begin
+        a = polygons.corners[k] - eye
+        b = polygons.corners[after] - eye
+        projected_out.edges[k] = edge_plane(a, b, turn)
+        if polygons.corners[k] == polygons.corners[after]:
+            # A repeated corner bounds nothing.
+            projected_out.edges[k] = wp.vec4d(f64(0.0), f64(0.0), f64(0.0), f64(-1.0))
+    for face in range(6):
+        rows = wp.vec2i(0, 0)
+        if usable:
+            rows = pixel_rows(polygons, projected_out, begin, end, eye, face, size)
+        projected_out.rows[6 * p + face] = rows
+
+
 @wp.func
-def covered_pixels(polygons: Polygons, p: int, face: int, row: int, size: int) -> wp.vec2i:
+def covered_pixels(polygons: Polygons, projected: Projected, p: int, face: int, row: int, size: int) -> wp.vec2i:
     """First and past-the-last pixel of a row whose closed squares lie inside the polygon."""
     axis = int(face // 2)
     u = int((axis + 1) % 3)
@@ -224,7 +230,7 @@ def covered_pixels(polygons: Polygons, p: int, face: int, row: int, size: int) -
     end = int(size)
     half = f64(0.5) * f64(size)
     for k in range(polygons.starts[p], polygons.starts[p + 1]):
-        m = polygons.edges[k]
+        m = projected.edges[k]
         # The edge function m_u a + rest is positive in the whole square if it is so at the border that m_u points from.
         rest = sign * m[axis] + wp.min(m[v] * bottom, m[v] * top) - m[3]
         if m[u] > f64(0.0):
@@ -239,34 +245,32 @@ def covered_pixels(polygons: Polygons, p: int, face: int, row: int, size: int) -
 
 
 @wp.kernel
-def _cover(polygons: Polygons, faces: Faces, size: int, first: int, last: int, slots: int, maps: Maps):
+def _cover(polygons: Polygons, projected: Projected, faces: Faces, size: int, first: int, maps_out: Maps):
     """Fill pixel row after pixel row of all images at level 0."""
     item = first + wp.tid()
-    while item < last:
-        slot = int(item // size)
-        row = int(item % size)
-        face = int(faces.keys[slot] % 6)
-        axis = int(face // 2)
-        for entry in range(faces.starts[slot], faces.starts[slot + 1]):
-            p = faces.polygons[entry]
-            rows = polygons.rows[6 * p + face]
-            if row >= rows[0] and row < rows[1]:
-                span = covered_pixels(polygons, p, face, row, size)
-                g = polygons.planes[p]
-                # By the resolution, a power of two, and so exactly what it is times a border.
-                slope = g[(axis + 1) % 3] / f64(size)
-                rise = g[(axis + 2) % 3]
-                bound = (wp.abs(g[0]) + wp.abs(g[1]) + wp.abs(g[2])) * DOT_BOUND
-                rest = face_sign(face) * g[axis] - bound
-                rest += wp.min(rise * border(row, size), rise * border(row + 1, size))
-                shift = -size
-                if slope < f64(0.0):
-                    shift += 2
-                for i in range(span[0], span[1]):
-                    value = wp.float32((slope * f64(2 * i + shift) + rest) * FLOAT32_DOWN)
-                    if value > maps.images[slot, row * size + i]:
-                        maps.images[slot, row * size + i] = value
-        item += slots
+    slot = int(item // size)
+    row = int(item % size)
+    face = int(faces.keys[slot] % 6)
+    axis = int(face // 2)
+    for entry in range(faces.starts[slot], faces.starts[slot + 1]):
+        p = faces.polygons[entry]
+        rows = projected.rows[6 * p + face]
+        if row >= rows[0] and row < rows[1]:
+            span = covered_pixels(polygons, projected, p, face, row, size)
+            g = projected.planes[p]
+            # By the resolution, a power of two, and so exactly what it is times a border.
+            slope = g[(axis + 1) % 3] / f64(size)
+            rise = g[(axis + 2) % 3]
+            bound = (wp.abs(g[0]) + wp.abs(g[1]) + wp.abs(g[2])) * DOT_BOUND
+            rest = face_sign(face) * g[axis] - bound
+            rest += wp.min(rise * border(row, size), rise * border(row + 1, size))
+            shift = -size
+            if slope < f64(0.0):
+                shift += 2
+            for i in range(span[0], span[1]):
+                value = wp.float32((slope * f64(2 * i + shift) + rest) * FLOAT32_DOWN)
+                if value > maps_out.images[slot, row * size + i]:
+                    maps_out.images[slot, row * size + i] = value
 
 
 @wp.func
@@ -277,22 +281,20 @@ def level_start(size: int, level: int) -> int:
 
 
 @wp.kernel
-def _reduce(size: int, level: int, first: int, last: int, slots: int, maps: Maps):
+def _reduce(size: int, level: int, first: int, maps_out: Maps):
     """Fill a level of the pyramids: the least of four pixels of the level before."""
     width = size >> level
     before = level_start(size, level - 1)
     here = level_start(size, level)
     item = first + wp.tid()
-    while item < last:
-        slot = int(item // width)
-        row = int(item % width)
-        for i in range(width):
-            a = before + 4 * row * width + 2 * i
-            b = a + 2 * width
-            low = wp.min(maps.images[slot, a], maps.images[slot, a + 1])
-            high = wp.min(maps.images[slot, b], maps.images[slot, b + 1])
-            maps.images[slot, here + row * width + i] = wp.min(low, high)
-        item += slots
+    slot = int(item // width)
+    row = int(item % width)
+    for i in range(width):
+        a = before + 4 * row * width + 2 * i
+        b = a + 2 * width
+        low = wp.min(maps_out.images[slot, a], maps_out.images[slot, a + 1])
+        high = wp.min(maps_out.images[slot, b], maps_out.images[slot, b + 1])
+        maps_out.images[slot, here + row * width + i] = wp.min(low, high)
 
 
 @dataclass
@@ -302,12 +304,12 @@ class CubeMaps:
     Attributes:
         resolution: pixels on a face's side, a power of two.
         arrays: the maps.
-        device: Warp device that holds them.
+        device: that holds them.
     """
 
     resolution: int
     arrays: Maps
-    device: str
+    device: Device
 
     def depth(self, index: int) -> np.ndarray:
         """Depth of map `index` [grid steps], shape (6, N, N), float64; infinite where nothing covers.
@@ -330,8 +332,7 @@ def launch_coverage(
     owners: np.ndarray,
     *,
     resolution: int = 512,
-    threads: int = 1,
-    device: str = "cpu",
+    device: Device = CPU,
 ) -> CubeMaps:
     """Cube maps of convex polygons: behind a pixel's depth every direction of that pixel is covered by one polygon.
 
@@ -343,8 +344,7 @@ def launch_coverage(
         starts: first corner of each polygon, and the total, shape (polygons + 1,), int.
         owners: map of each polygon, shape (polygons,), int.
         resolution: pixels on a face's side, a power of two, 2 to 4096.
-        threads: CPU threads.
-        device: Warp device.
+        device: where to.
 
     Returns:
         The maps. Depth may be too far, and a covered pixel may be left open; never the other way round.
@@ -355,29 +355,17 @@ def launch_coverage(
     points, corners = (np.ascontiguousarray(x, np.float64) for x in (viewpoints, corners))
     starts, owners = (np.ascontiguousarray(x, np.int32) for x in (starts, owners))
     _check(points, corners, starts, owners, resolution)
-    polygons = _project_polygons(points, corners, starts, owners, resolution, threads, device)
-    faces, slots = _faces(polygons.rows.numpy().reshape(-1, 6, 2), owners, len(points), device)
-    maps = Maps()
-    maps.viewpoints, maps.slots = polygons.viewpoints, wp.array(slots, dtype=int, device=device)
-    images = len(faces.keys)
-    pixels = (4 * resolution**2 - 1) // 3
-    maps.images = wp.zeros((images, pixels), dtype=wp.float32, device=device)
-
-    def cover(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
-        wp.launch(_cover, dim=slots, inputs=[polygons, faces, resolution, first, last, slots, maps], device=device)
-
-    run_sliced(cover, images * resolution, SlotSizes(1, 1), module=__name__, threads=threads, device=device)
+    polygons = device.struct(Polygons, viewpoints=points, corners=corners, starts=starts, owners=owners)
+    count = len(owners)
+    projected = device.struct(Projected, edges=len(corners), planes=count, rows=6 * count)
+    launch_rows(_project, count, [polygons, resolution], [projected], device)
+    faces, slots = _faces(projected.rows.numpy().reshape(-1, 6, 2), owners, len(points), device)
+    images, pixels = len(faces.keys), (4 * resolution**2 - 1) // 3
+    maps = device.struct(Maps, viewpoints=polygons.viewpoints, slots=slots, images=(images, pixels))
+    launch_rows(_cover, images * resolution, [polygons, projected, faces, resolution], [maps], device)
     for level in range(1, resolution.bit_length()):
-        _launch_reduce(maps, resolution, level, threads, device)
+        launch_rows(_reduce, images * (resolution >> level), [resolution, level], [maps], device)
     return CubeMaps(resolution, maps, device)
-
-
-def _launch_reduce(maps: Maps, size: int, level: int, threads: int, device: str) -> None:
-    def reduce(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
-        wp.launch(_reduce, dim=slots, inputs=[size, level, first, last, slots, maps], device=device)
-
-    count = maps.images.shape[0] * (size >> level)
-    run_sliced(reduce, count, SlotSizes(1, 1), module=__name__, threads=threads, device=device)
 
 
 def check_resolution(resolution: int) -> None:
@@ -402,32 +390,7 @@ def _check(points: np.ndarray, corners: np.ndarray, starts: np.ndarray, owners: 
     check_resolution(resolution)
 
 
-def _project_polygons(
-    points: np.ndarray,
-    corners: np.ndarray,
-    starts: np.ndarray,
-    owners: np.ndarray,
-    resolution: int,
-    threads: int,
-    device: str,
-) -> Polygons:
-    polygons = Polygons()
-    polygons.viewpoints = wp.array(points, dtype=wp.vec3d, device=device)
-    polygons.corners = wp.array(corners, dtype=wp.vec3d, device=device)
-    polygons.starts = wp.array(starts, dtype=int, device=device)
-    polygons.owners = wp.array(owners, dtype=int, device=device)
-    polygons.edges = wp.zeros(len(corners), dtype=wp.vec4d, device=device)
-    polygons.planes = wp.zeros(len(owners), dtype=wp.vec3d, device=device)
-    polygons.rows = wp.zeros(6 * len(owners), dtype=wp.vec2i, device=device)
-
-    def project(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
-        wp.launch(_project, dim=slots, inputs=[polygons, resolution, first, last, slots], device=device)
-
-    run_sliced(project, len(owners), SlotSizes(1, 1), module=__name__, threads=threads, device=device)
-    return polygons
-
-
-def _faces(rows: np.ndarray, owners: np.ndarray, maps: int, device: str) -> tuple[Faces, np.ndarray]:
+def _faces(rows: np.ndarray, owners: np.ndarray, maps: int, device: Device) -> tuple[Faces, np.ndarray]:
     """Faces that some polygon reaches, and the image of each face of each map, -1 for none; rows (polygons, 6, 2)."""
     polygon, face = np.nonzero(rows[:, :, 0] < rows[:, :, 1])
     keys = owners[polygon] * 6 + face
@@ -435,8 +398,5 @@ def _faces(rows: np.ndarray, owners: np.ndarray, maps: int, device: str) -> tupl
     used, first = np.unique(keys[order], return_index=True)
     slots = np.full(6 * maps, -1, np.int32)
     slots[used] = np.arange(len(used))
-    faces = Faces()
-    faces.keys = wp.array(used.astype(np.int32), dtype=int, device=device)
-    faces.starts = wp.array(np.append(first, len(keys)).astype(np.int32), dtype=int, device=device)
-    faces.polygons = wp.array(polygon[order].astype(np.int32), dtype=int, device=device)
+    faces = device.struct(Faces, keys=used, starts=np.append(first, len(keys)), polygons=polygon[order])
     return faces, slots

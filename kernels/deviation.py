@@ -23,7 +23,7 @@ import warp as wp
 
 from ..data.errors import InputError
 from ..data.hierarchy import build_hierarchy
-from .launch import SlotSizes, run_sliced
+from .launch import CPU, Device, launch_rows
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -47,10 +47,10 @@ FAR = wp.constant(wp.float64(np.inf))
 class TriangleTree:
     """Triangles (three corners each) and a hierarchy of boxes about them; links as of `data.hierarchy`."""
 
-    lo: wp.array(dtype=wp.vec3d)
-    hi: wp.array(dtype=wp.vec3d)
-    links: wp.array(dtype=wp.vec2i)
-    corners: wp.array(dtype=wp.vec3d)
+    lo: wp.array[wp.vec3d]
+    hi: wp.array[wp.vec3d]
+    links: wp.array[wp.vec2i]
+    corners: wp.array[wp.vec3d]
 
 
 @wp.func
@@ -169,79 +169,71 @@ def crossing(tree: TriangleTree, p: wp.vec3d, q: wp.vec3d, first: int, second: i
 @wp.kernel
 def _nearest(
     tree: TriangleTree,
-    points: wp.array(dtype=wp.vec3d),
+    points: wp.array[wp.vec3d],
     first: int,
-    last: int,
-    slots: int,
-    near_out: wp.array(dtype=int),
-    low_out: wp.array(dtype=wp.float64),
+    near_out: wp.array[int],
+    low_out: wp.array[wp.float64],
 ):
     row = first + wp.tid()
-    while row < last:
-        found = nearest(tree, points[row], 0)
-        near_out[row] = int(found[0])
-        low_out[row] = found[1]
-        row += slots
+    found = nearest(tree, points[row], 0)
+    near_out[row] = int(found[0])
+    low_out[row] = found[1]
 
 
 @wp.kernel
 def _bound(
     tree: TriangleTree,
-    corners: wp.array(dtype=wp.vec3d),
-    near: wp.array(dtype=wp.vec3i),
+    corners: wp.array[wp.vec3d],
+    near: wp.array[wp.vec3i],
     enough: wp.float64,
     halve: int,
     first: int,
-    last: int,
-    slots: int,
-    upper_out: wp.array(dtype=wp.float64),
-    low_out: wp.array(dtype=wp.float64),
-    cut_out: wp.array(dtype=wp.vec2i),
-    point_out: wp.array(dtype=wp.vec3d),
+    upper_out: wp.array[wp.float64],
+    low_out: wp.array[wp.float64],
+    cut_out: wp.array[wp.vec2i],
+    point_out: wp.array[wp.vec3d],
 ):
     row = first + wp.tid()
-    while row < last:
-        a = corners[3 * row]
-        b = corners[3 * row + 1]
-        c = corners[3 * row + 2]
-        found = nearest(tree, (a + b + c) / f64(3.0), near[row][0])
-        low = f64(found[1])
-        square = piece_square(tree, int(found[0]), a, b, c)
+    a = corners[3 * row]
+    b = corners[3 * row + 1]
+    c = corners[3 * row + 2]
+    found = nearest(tree, (a + b + c) / f64(3.0), near[row][0])
+    low = f64(found[1])
+    square = piece_square(tree, int(found[0]), a, b, c)
+    for k in range(3):
+        square = wp.min(square, piece_square(tree, near[row][k], a, b, c))
+    upper = wp.sqrt(square)
+    edge = int(0)
+    if upper > enough:
+        longest = f64(-1.0)
+        at = f64(0.5)
         for k in range(3):
-            square = wp.min(square, piece_square(tree, near[row][k], a, b, c))
-        upper = wp.sqrt(square)
-        edge = int(0)
-        if upper > enough:
-            longest = f64(-1.0)
-            at = f64(0.5)
-            for k in range(3):
-                p = corners[3 * row + k]
-                q = corners[3 * row + (k + 1) % 3]
-                if wp.length_sq(q - p) > longest:
+            p = corners[3 * row + k]
+            q = corners[3 * row + (k + 1) % 3]
+            if wp.length_sq(q - p) > longest:
+                longest = wp.length_sq(q - p)
+                edge = k
+        longest = f64(-1.0)
+        for k in range(3):
+            p = corners[3 * row + k]
+            q = corners[3 * row + (k + 1) % 3]
+            one = near[row][k]
+            two = near[row][(k + 1) % 3]
+            if halve == 0 and one != two and wp.length_sq(q - p) > longest:
+                t = crossing(tree, p, q, one, two)
+                if t > f64(0.0) and t < f64(1.0):
                     longest = wp.length_sq(q - p)
                     edge = k
-            longest = f64(-1.0)
-            for k in range(3):
-                p = corners[3 * row + k]
-                q = corners[3 * row + (k + 1) % 3]
-                one = near[row][k]
-                two = near[row][(k + 1) % 3]
-                if halve == 0 and one != two and wp.length_sq(q - p) > longest:
-                    t = crossing(tree, p, q, one, two)
-                    if t > f64(0.0) and t < f64(1.0):
-                        longest = wp.length_sq(q - p)
-                        edge = k
-                        at = t
-            p = corners[3 * row + edge]
-            q = corners[3 * row + (edge + 1) % 3]
-            x = p + (q - p) * at
-            found = nearest(tree, x, near[row][edge])
-            low = wp.max(low, found[1])
-            point_out[row] = x
-        upper_out[row] = upper
-        low_out[row] = low
-        cut_out[row] = wp.vec2i(edge, int(found[0]))
-        row += slots
+                    at = t
+        p = corners[3 * row + edge]
+        q = corners[3 * row + (edge + 1) % 3]
+        x = p + (q - p) * at
+        found = nearest(tree, x, near[row][edge])
+        low = wp.max(low, found[1])
+        point_out[row] = x
+    upper_out[row] = upper
+    low_out[row] = low
+    cut_out[row] = wp.vec2i(edge, int(found[0]))
 
 
 @dataclass(frozen=True)
@@ -263,8 +255,7 @@ def launch_deviation(
     *,
     relative: float = 0.01,
     absolute: float = 2.0**-15,
-    threads: int = 1,
-    device: str = "cpu",
+    device: Device = CPU,
 ) -> Deviation:
     """How far two surfaces are from each other at most, and at least, in each direction.
 
@@ -273,8 +264,7 @@ def launch_deviation(
         b: likewise, shape (m, 3, 3), in the same frame and unit.
         relative: search ends where upper <= lower * (1 + relative) ...
         absolute: ... or upper <= lower + absolute, above 0.
-        threads: CPU threads.
-        device: Warp device. The answer depends neither on it nor on `threads`.
+        device: where to.
 
     Returns:
         Bounds with lower <= true distance <= upper, rounding included. Should MAX_PIECES be reached, upper is above
@@ -295,7 +285,7 @@ def launch_deviation(
     if not (absolute > 0 and 0 <= relative < np.inf):
         raise InputError(f"relative, absolute: expected at least 0 and above 0, found {relative} and {absolute}")
     margin = ROUNDING * max(np.abs(a).max(), np.abs(b).max())
-    search = _Search(relative, absolute, margin, threads, device)
+    search = _Search(relative, absolute, margin, device)
     lower, upper = zip(search.directed(a, b), search.directed(b, a), strict=True)
     return Deviation(np.array(lower), np.array(upper))
 
@@ -307,8 +297,7 @@ class _Search:
     relative: float
     absolute: float
     margin: float
-    threads: int
-    device: str
+    device: Device
 
     def directed(self, a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
         """Lower and upper bound on the greatest distance from a to b."""
@@ -340,47 +329,22 @@ class _Search:
         scale = 2.0 ** (BOX_BITS - 1 - np.ceil(np.log2(max(np.abs(triangles).max(), 2.0**-900))))
         low, high = triangles.min(axis=1) * scale, triangles.max(axis=1) * scale
         hierarchy = build_hierarchy(np.stack([np.floor(low), np.ceil(high)], axis=1).astype(np.int32))
-        tree = TriangleTree()
-        tree.lo, tree.hi = (self._points(hierarchy.boxes[:, end] / scale) for end in (0, 1))
-        tree.links = wp.array(hierarchy.links, dtype=wp.vec2i, device=self.device)
-        tree.corners = self._points(triangles)
-        return tree
-
-    def _points(self, values: np.ndarray) -> wp.array:
-        values = np.ascontiguousarray(values, np.float64).reshape(-1, 3)
-        return wp.array(values, dtype=wp.vec3d, device=self.device)
-
-    def _empty(self, count: int, dtype: type) -> wp.array:
-        return wp.zeros(count, dtype=dtype, device=self.device)
+        lo, hi = (hierarchy.boxes[:, end] / scale for end in (0, 1))
+        return self.device.struct(TriangleTree, lo=lo, hi=hi, links=hierarchy.links, corners=triangles.reshape(-1, 3))
 
     def _nearest(self, tree: TriangleTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        count, given = len(points), self._points(points)
-        near, low = self._empty(count, int), self._empty(count, wp.float64)
-
-        def launch(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
-            wp.launch(_nearest, dim=slots, inputs=[tree, given, first, last, slots, near, low], device=self.device)
-
-        self._run(launch, count)
+        near, low = self.device.zeros(len(points), int), self.device.zeros(len(points), f64)
+        launch_rows(_nearest, len(points), [tree, self.device.array(points, wp.vec3d)], [near, low], self.device)
         return near.numpy(), low.numpy()
 
     def _bound(
         self, tree: TriangleTree, a: np.ndarray, near: np.ndarray, enough: float, halve: bool
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, ...]:
         """Of each piece: upper bound, lower bound, (cut edge, triangle nearest to the cut), and the cut."""
-        count, corners = len(a), self._points(a)
-        nearby = wp.array(np.ascontiguousarray(near, np.int32), dtype=wp.vec3i, device=self.device)
-        upper, low = self._empty(count, wp.float64), self._empty(count, wp.float64)
-        cut, point = self._empty(count, wp.vec2i), self._empty(count, wp.vec3d)
-
-        def launch(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
-            inputs = [tree, corners, nearby, f64(enough), int(halve), first, last, slots, upper, low, cut, point]
-            wp.launch(_bound, dim=slots, inputs=inputs, device=self.device)
-
-        self._run(launch, count)
-        return upper.numpy(), low.numpy(), cut.numpy(), point.numpy()
-
-    def _run(self, launch: object, count: int) -> None:
-        run_sliced(launch, count, SlotSizes(1, 1), module=__name__, threads=self.threads, device=self.device)
+        corners, nearby = self.device.array(a.reshape(-1, 3), wp.vec3d), self.device.array(near, wp.vec3i)
+        out = [self.device.zeros(len(a), kind) for kind in (f64, f64, wp.vec2i, wp.vec3d)]
+        launch_rows(_bound, len(a), [tree, corners, nearby, f64(enough), int(halve)], out, self.device)
+        return tuple(column.numpy() for column in out)
 
 
 def _halves(a: np.ndarray, near: np.ndarray, cut: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,23 +10,24 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ..data.verdict import Verdict
 from .graph import DeviceGraph, reflect_high, reflect_low
-from .launch import SlotSizes, run_sliced
+from .launch import CPU, Device, Scratch, run_sliced
 from .stab import (
     AT_M,
     AT_W,
-    HIDDEN,
     LEVEL_SIZE,
-    LIST_CAPACITY,
     LISTS_SIZE,
-    STABBED,
-    UNDECIDED,
     append_box,
     decide,
+    direction,
+    level_maxima,
+    load_counts,
     offsets,
     raise_maxima,
+    slot_size,
     start_level,
-    vec6d,
+    store_counts,
     vec6i,
     worst_cycle,
 )
@@ -35,87 +36,152 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 f64 = wp.float64
 
-# Portals in one sequence; deeper branches leave their source unfinished.
+# Portals in one sequence; deeper branches leave their source unfinished. A list holds a row per box of the sequence, so
+# this is less than LIST_CAPACITY.
 MAX_DEPTH = wp.constant(80)
-# Levels + lists + two spare polygons + the failing cut.
-SLOT_SIZE = wp.constant((80 + 1) * (27 + 1 + 4 * 24) + 6 * 96 * 2 + 2 * (1 + 4 * 24) + 8)
-# Integers a level: cell, cursor, basis level, decided flag, six row counts.
-FRAME = wp.constant(10)
+SLOT_SIZE = wp.constant(slot_size(MAX_DEPTH + 1))
+# Integers per level: cell, next entry of its adjacency, the level that was decided last, and six row counts.
+FRAME = wp.constant(9)
+AT_COUNTS = wp.constant(3)
+STACK_SIZE = wp.constant((MAX_DEPTH + 1) * FRAME)
+
+
+@wp.struct
+class Slot:
+    """Where the levels, the lists and the spares of a slot begin in `work`, and its stack in `frames`."""
+
+    levels: int
+    lists: int
+    spare: int
+    stack: int
 
 
 @wp.func
-def store_counts(frames: wp.array(dtype=int), at: int, counts: vec6i):
-    """Save the row counts of a level."""
-    for p in range(6):
-        frames[at + 4 + p] = counts[p]
-
-
-@wp.func
-def load_counts(frames: wp.array(dtype=int), at: int) -> vec6i:
-    """Row counts of a level."""
-    counts = vec6i()
-    for p in range(6):
-        counts[p] = frames[at + 4 + p]
-    return counts
+def slot_at(number: int) -> Slot:
+    """Layout of a slot's scratch."""
+    out = Slot()
+    out.levels = number * SLOT_SIZE
+    out.lists = out.levels + (MAX_DEPTH + 1) * LEVEL_SIZE
+    out.spare = out.lists + LISTS_SIZE
+    out.stack = number * STACK_SIZE
+    return out
 
 
 @wp.struct
 class Found:
-    """Where a search reports: one row a pair it stabbed for the first time."""
+    """Where a search reports: one row per pair that it saw for the first time."""
 
-    count: wp.array(dtype=int)
-    pair: wp.array(dtype=wp.vec3i)
-    line: wp.array(dtype=wp.vec3d)
-    offset: wp.array(dtype=wp.vec3d)
+    count: wp.array[int]
+    pair: wp.array[wp.vec3i]
+    line: wp.array[wp.vec3d]
+    offset: wp.array[wp.vec3d]
+
+
+@wp.func
+def start_source(graph: DeviceGraph, source: int, octant: int, slot: Slot, work: wp.array[f64], frames: wp.array[int]):
+    """Level 0 and frame 0: the lines that leave a cell."""
+    lo = reflect_low(graph.cell_lo[source], graph.cell_hi[source], octant)
+    hi = reflect_high(graph.cell_lo[source], graph.cell_hi[source], octant)
+    counts = append_box(work, slot.lists, vec6i(), lo, hi, -1)
+    start_level(work, slot.levels)
+    # The source box alone is met by every direction; any w will do until a portal says otherwise.
+    decide(work, slot.lists, slot.levels, slot.levels + LEVEL_SIZE, slot.spare, vec6i(), counts)
+    for k in range(LEVEL_SIZE):
+        work[slot.levels + k] = work[slot.levels + LEVEL_SIZE + k]
+    frames[slot.stack] = source
+    frames[slot.stack + 1] = graph.starts[source]
+    frames[slot.stack + 2] = 0
+    store_counts(frames, slot.stack + AT_COUNTS, counts)
+
+
+@wp.func
+def cross_portal(
+    graph: DeviceGraph,
+    entry: wp.vec4i,
+    octant: int,
+    depth: int,
+    slot: Slot,
+    work: wp.array[f64],
+    frames: wp.array[int],
+) -> int:
+    """Verdict on the lines of a sequence that go on through a portal; the cell behind it gets the next frame."""
+    at = slot.stack + depth * FRAME
+    level = slot.levels + depth * LEVEL_SIZE
+    child = level + LEVEL_SIZE
+    lo = reflect_low(graph.portal_lo[entry[0]], graph.portal_hi[entry[0]], octant)
+    hi = reflect_high(graph.portal_lo[entry[0]], graph.portal_hi[entry[0]], octant)
+    w = direction(work, level)
+    m = raise_maxima(level_maxima(work, level), w, lo, hi, entry[2])
+    grown = append_box(work, slot.lists, load_counts(frames, at + AT_COUNTS), lo, hi, entry[2])
+    decided = frames[at + 2]
+    verdict = int(Verdict.VISIBLE)
+    # The slack below keeps the shortcut exact when w is one of the rare unrounded directions.
+    if worst_cycle(m) < f64(-0.5):
+        for c in range(3):
+            work[child + AT_W + c] = w[c]
+        for p in range(6):
+            work[child + AT_M + p] = m[p]
+    else:
+        inherited = slot.levels + decided * LEVEL_SIZE
+        before = load_counts(frames, slot.stack + decided * FRAME + AT_COUNTS)
+        verdict = decide(work, slot.lists, inherited, child, slot.spare, before, grown)
+        decided = depth + 1
+    frames[at + FRAME] = entry[1]
+    frames[at + FRAME + 1] = graph.starts[entry[1]]
+    frames[at + FRAME + 2] = decided
+    store_counts(frames, at + FRAME + AT_COUNTS, grown)
+    return verdict
+
+
+@wp.func
+def report_reached(
+    verdict: int,
+    row: int,
+    behind: int,
+    octant: int,
+    child: int,
+    work: wp.array[f64],
+    reached_out: wp.array2d[wp.uint8],
+    found_out: Found,
+):
+    """Mark a cell as reached, and write down the line of the first sequence that surely reaches it."""
+    code = reached_out[row, behind]
+    if verdict == Verdict.VISIBLE and code != wp.uint8(Verdict.VISIBLE):
+        reached_out[row, behind] = wp.uint8(Verdict.VISIBLE)
+        spot = wp.atomic_add(found_out.count, 0, 1)
+        if spot < found_out.pair.shape[0]:
+            found_out.pair[spot] = wp.vec3i(row, behind, octant)
+            found_out.line[spot] = direction(work, child)
+            found_out.offset[spot] = offsets(level_maxima(work, child))
+    if verdict == Verdict.UNKNOWN and code == wp.uint8(Verdict.HIDDEN):
+        reached_out[row, behind] = wp.uint8(Verdict.UNKNOWN)
 
 
 @wp.kernel
 def _flood(
     graph: DeviceGraph,
-    sources: wp.array(dtype=int),
-    first: int,
-    last: int,
+    sources: wp.array[int],
     octant: int,
     cap: int,
-    work: wp.array(dtype=f64),
-    frames: wp.array(dtype=int),
-    reached_out: wp.array2d(dtype=wp.uint8),
-    tests_out: wp.array2d(dtype=int),
-    found: Found,
+    first: int,
+    last: int,
+    slots: int,
+    work: wp.array[f64],
+    frames: wp.array[int],
+    reached_out: wp.array2d[wp.uint8],
+    tests_out: wp.array2d[int],
+    found_out: Found,
 ):
-    slot = wp.tid()
-    levels = slot * SLOT_SIZE
-    lists = levels + (MAX_DEPTH + 1) * LEVEL_SIZE
-    spare = lists + LISTS_SIZE
-    stack = slot * (MAX_DEPTH + 1) * FRAME
-    slots = work.shape[0] // SLOT_SIZE
-    row = first + slot
+    slot = slot_at(wp.tid())
+    row = first + wp.tid()
     while row < last:
-        source = sources[row]
-        counts = append_box(
-            work,
-            lists,
-            vec6i(),
-            reflect_low(graph.cell_lo[source], graph.cell_hi[source], octant),
-            reflect_high(graph.cell_lo[source], graph.cell_hi[source], octant),
-            -1,
-        )
-        start_level(work, levels)
-        # The source box alone is met by every direction; any w will do until a portal says otherwise.
-        decide(work, lists, levels, levels + LEVEL_SIZE, spare, vec6i(), counts)
-        for k in range(LEVEL_SIZE):
-            work[levels + k] = work[levels + LEVEL_SIZE + k]
-        frames[stack] = source
-        frames[stack + 1] = graph.starts[source]
-        frames[stack + 2] = 0
-        store_counts(frames, stack, counts)
+        start_source(graph, sources[row], octant, slot, work, frames)
         depth = int(0)
         tests = int(0)
         while depth >= 0:
-            at = stack + depth * FRAME
-            cell = frames[at]
+            at = slot.stack + depth * FRAME
             cursor = frames[at + 1]
-            if cursor == graph.starts[cell + 1]:
+            if cursor == graph.starts[frames[at] + 1]:
                 depth -= 1
             elif tests >= cap:
                 tests = -1
@@ -125,71 +191,21 @@ def _flood(
                 entry = graph.entries[cursor]
                 if ((entry[3] >> octant) & 1) == 1:
                     tests += 1
-                    counts = load_counts(frames, at)
-                    portal = entry[0]
-                    lo = reflect_low(graph.portal_lo[portal], graph.portal_hi[portal], octant)
-                    hi = reflect_high(graph.portal_lo[portal], graph.portal_hi[portal], octant)
-                    level = levels + depth * LEVEL_SIZE
-                    child = level + LEVEL_SIZE
-                    w = wp.vec3d(work[level + AT_W], work[level + AT_W + 1], work[level + AT_W + 2])
-                    m = vec6d()
-                    for p in range(6):
-                        m[p] = work[level + AT_M + p]
-                    m = raise_maxima(m, w, lo, hi, entry[2])
-                    grown = append_box(work, lists, counts, lo, hi, entry[2])
-                    basis = frames[at + 2]
-                    verdict = STABBED
-                    # The slack below keeps the shortcut exact when w is one of the rare unrounded directions.
-                    if worst_cycle(m) < f64(-0.5):
-                        for c in range(3):
-                            work[child + AT_W + c] = w[c]
-                        for p in range(6):
-                            work[child + AT_M + p] = m[p]
-                    else:
-                        verdict = decide(
-                            work,
-                            lists,
-                            levels + basis * LEVEL_SIZE,
-                            child,
-                            spare,
-                            load_counts(frames, stack + basis * FRAME),
-                            grown,
-                        )
-                        basis = depth + 1
-                    if verdict != HIDDEN:
-                        behind = entry[1]
-                        code = reached_out[row, behind]
-                        if verdict == STABBED and code != wp.uint8(STABBED):
-                            reached_out[row, behind] = wp.uint8(STABBED)
-                            mm = vec6d()
-                            for p in range(6):
-                                mm[p] = work[child + AT_M + p]
-                            spot = wp.atomic_add(found.count, 0, 1)
-                            if spot < found.pair.shape[0]:
-                                found.pair[spot] = wp.vec3i(row, behind, octant)
-                                found.line[spot] = wp.vec3d(
-                                    work[child + AT_W], work[child + AT_W + 1], work[child + AT_W + 2]
-                                )
-                                found.offset[spot] = offsets(mm)
-                        if verdict == UNDECIDED and code == wp.uint8(0):
-                            reached_out[row, behind] = wp.uint8(UNDECIDED)
-                        if depth + 1 == MAX_DEPTH or grown[0] + 4 > LIST_CAPACITY:
+                    verdict = cross_portal(graph, entry, octant, depth, slot, work, frames)
+                    if verdict != Verdict.HIDDEN:
+                        child = slot.levels + (depth + 1) * LEVEL_SIZE
+                        report_reached(verdict, row, entry[1], octant, child, work, reached_out, found_out)
+                        depth += 1
+                        if depth == MAX_DEPTH:
                             tests = -1
                             depth = -1
-                        else:
-                            depth += 1
-                            down = stack + depth * FRAME
-                            frames[down] = behind
-                            frames[down + 1] = graph.starts[behind]
-                            frames[down + 2] = basis
-                            store_counts(frames, down, grown)
         tests_out[row, octant] = tests
         row += slots
 
 
-# Sources a CPU launch: what they find is collected after each, so a launch's room is this times the number of cells.
+# Sources per CPU launch: what they find is collected after each, so a launch's room is this times the number of cells.
 CHUNK = 64
-# Pairs a GPU launch has room for, 60 bytes each.
+# Pairs that a GPU launch has room for, 60 bytes each.
 GPU_ROOM = 2**25
 
 
@@ -199,7 +215,7 @@ class FloodAnswers:
 
     Attributes:
         pairs: (row of the source, reached cell, octant), shape (n, 3), int32, sorted; one row for the first octant that
-            stabbed the pair.
+            has a line for the pair.
         line: w of each pair's line, float64, shape (n, 3), as in `TargetAnswers`.
         offset: its xi.
         undecided: (row, cell) pairs that only a line too thin to decide reaches, shape (sources, cells), bool.
@@ -215,23 +231,13 @@ class FloodAnswers:
     tests: int
 
 
-def found_room(size: int, device: str) -> Found:
-    """Room for so many found pairs."""
-    found = Found()
-    found.count = wp.zeros(1, dtype=int, device=device)
-    found.pair = wp.empty(size, dtype=wp.vec3i, device=device)
-    found.line, found.offset = (wp.empty(size, dtype=wp.vec3d, device=device) for _ in range(2))
-    return found
-
-
 def launch_flood(
     graph: DeviceGraph,
     sources: np.ndarray,
     octants: tuple[int, ...] = tuple(range(8)),
     *,
     cap: int,
-    threads: int = 1,
-    device: str = "cpu",
+    device: Device = CPU,
 ) -> FloodAnswers:
     """Flood from every source, octant by octant.
 
@@ -240,32 +246,31 @@ def launch_flood(
         sources: cells, shape (n,), int.
         octants: directions searched; four that all keep one sign suffice when every cell is a source, because a
             sightline can be followed either way.
-        cap: stabbing decisions a source and octant.
-        threads: CPU threads.
-        device: Warp device.
+        cap: stabbing decisions per source and octant.
+        device: where to.
     """
     count, cells = len(sources), graph.cell_lo.shape[0]
-    source = wp.array(np.ascontiguousarray(sources, np.int32), dtype=int, device=device)
-    reached = wp.zeros((count, cells), dtype=wp.uint8, device=device)
-    tests = wp.zeros((count, 8), dtype=int, device=device)
+    source = device.array(sources, int)
+    reached, tests = device.zeros((count, cells), wp.uint8), device.zeros((count, 8), int)
     rooms: dict[int, Found] = {}
-    chunk = CHUNK if wp.get_device(device).is_cpu else max(CHUNK, GPU_ROOM // cells)
+    chunk = CHUNK if device.is_cpu else max(CHUNK, GPU_ROOM // cells)
     gathered: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
 
-    def launch(first: int, last: int, slots: int, scratch: wp.array, frames: wp.array) -> None:
+    def launch(first: int, last: int, slots: int, work: wp.array, frames: wp.array) -> None:
         # Each thread brings its own scratch, and keeps its own room for what it finds.
-        found = rooms.get(scratch.ptr)
+        found = rooms.get(work.ptr)
         if found is None:
-            found = rooms[scratch.ptr] = found_room(min(chunk, count) * cells, device)
+            room = min(chunk, count) * cells
+            found = rooms[work.ptr] = device.struct(Found, count=1, pair=room, line=room, offset=room)
         found.count.zero_()
         for octant in octants:
-            inputs = [graph, source, first, last, octant, cap, scratch, frames, reached, tests, found]
-            wp.launch(_flood, dim=slots, inputs=inputs, device=device)
+            inputs = [graph, source, octant, cap, first, last, slots, work, frames]
+            wp.launch(_flood, dim=slots, inputs=inputs, outputs=[reached, tests, found], device=device.name)
         used = int(found.count.numpy()[0])
         gathered.append(tuple(x[:used].numpy().copy() for x in (found.pair, found.line, found.offset)))
 
-    sizes = SlotSizes(int(SLOT_SIZE), (int(MAX_DEPTH) + 1) * int(FRAME))
-    run_sliced(launch, count, sizes, module=__name__, threads=threads, device=device, chunk=chunk)
+    scratch = Scratch(int(SLOT_SIZE), int(STACK_SIZE))
+    run_sliced(launch, count, _flood.module, device, scratch=scratch, chunk=chunk, gpu_chunk=chunk)
     pairs, line, offset = (np.concatenate(column) for column in zip(*gathered, strict=True))
     order = np.lexsort((pairs[:, 1], pairs[:, 0]))
     spent = tests.numpy()[:, list(octants)]
@@ -273,7 +278,7 @@ def launch_flood(
         pairs[order],
         line[order],
         offset[order],
-        reached.numpy() == int(UNDECIDED),
+        reached.numpy() == Verdict.UNKNOWN,
         (spent >= 0).all(axis=1),
         int(np.maximum(spent, 0).sum()),
     )

@@ -4,7 +4,7 @@ import numpy as np
 import warp as wp
 
 from ..data.graph import CellGraph
-from .launch import vectors
+from .launch import CPU, Device
 
 f64 = wp.float64
 
@@ -17,15 +17,15 @@ class DeviceGraph:
     lies in octant o can cross that way. Bit i of an octant is set when direction component i is negative.
     """
 
-    cell_lo: wp.array(dtype=wp.vec3i)
-    cell_hi: wp.array(dtype=wp.vec3i)
-    portal_lo: wp.array(dtype=wp.vec3i)
-    portal_hi: wp.array(dtype=wp.vec3i)
-    starts: wp.array(dtype=int)
-    entries: wp.array(dtype=wp.vec4i)
+    cell_lo: wp.array[wp.vec3i]
+    cell_hi: wp.array[wp.vec3i]
+    portal_lo: wp.array[wp.vec3i]
+    portal_hi: wp.array[wp.vec3i]
+    starts: wp.array[int]
+    entries: wp.array[wp.vec4i]
 
 
-def device_graph(graph: CellGraph, device: str = "cpu") -> DeviceGraph:
+def device_graph(graph: CellGraph, device: Device = CPU) -> DeviceGraph:
     """Copy the graph to a device."""
     starts, pairs = graph.adjacency()
     here = np.repeat(np.arange(graph.cell_count), np.diff(starts))
@@ -34,14 +34,15 @@ def device_graph(graph: CellGraph, device: str = "cpu") -> DeviceGraph:
     octants = np.arange(8)
     negative = (octants[None, :] >> axis[:, None]) & 1
     mask = ((negative == (~forward[:, None]).astype(np.int64)) << octants).sum(axis=1)
-    out = DeviceGraph()
-    out.cell_lo = vectors(graph.cells[:, 0], device)
-    out.cell_hi = vectors(graph.cells[:, 1], device)
-    out.portal_lo = vectors(graph.portals[:, 0], device)
-    out.portal_hi = vectors(graph.portals[:, 1], device)
-    out.starts = wp.array(starts, dtype=int, device=device)
-    out.entries = wp.array(np.column_stack([pairs, axis, mask]).astype(np.int32), dtype=wp.vec4i, device=device)
-    return out
+    return device.struct(
+        DeviceGraph,
+        cell_lo=device.corners(graph.cells[:, 0]),
+        cell_hi=device.corners(graph.cells[:, 1]),
+        portal_lo=device.corners(graph.portals[:, 0]),
+        portal_hi=device.corners(graph.portals[:, 1]),
+        starts=starts,
+        entries=np.column_stack([pairs, axis, mask]),
+    )
 
 
 @wp.func

@@ -1,8 +1,8 @@
-"""Launching kernels that loop over work items with a scratch slot each, on CPU threads or a GPU."""
+"""Where kernels run, and launching them over rows of work on CPU threads or a GPU."""
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -10,49 +10,86 @@ import numpy as np
 import warp as wp
 
 from ..data.errors import InputError
+from ..data.hierarchy import Hierarchy
 from ..data.scene import GRID_LIMIT
 
-# Items a CPU thread takes at a time: small enough to balance, large enough to hide the launch (about 50 us).
+# Rows a CPU thread takes at a time: small enough to balance, large enough to hide the launch (about 50 us).
 CHUNK = 1024
 GPU_SLOTS = 8192
 
 
 @dataclass(frozen=True)
-class SlotSizes:
-    """Scratch that one slot needs: float64 values and integers."""
+class Device:
+    """Where kernels run; no answer depends on it.
 
-    values: int
-    integers: int
-
-
-def thread_count(threads: int | None) -> int:
-    """The given number of threads, or one a core."""
-    # Cores this process may use, not those of the machine; not every system can tell.
-    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return threads or allowed or 1
-
-
-def check_device(device: str) -> None:
-    """Refuse a device that Warp does not know with an InputError."""
-    try:
-        wp.get_device(device)
-    except Exception as error:  # Warp raises several types for an unknown or absent device
-        raise InputError(f"device: expected one that Warp knows, found {device!r} ({error})") from None
-
-
-def vectors(rows: np.ndarray, device: str) -> wp.array:
-    """Corners in grid steps, three integers each, as a Warp array of vec3i.
-
-    Raises:
-        InputError: a coordinate beyond the grid (data/scene.py), where products of differences stop being exact.
+    Attributes:
+        name: Warp's name, such as "cpu" or "cuda:0".
+        threads: of the CPU; a GPU has its own.
     """
-    check_coordinates(rows)
-    return triples(rows, device)
+
+    name: str = "cpu"
+    threads: int = 1
+
+    @classmethod
+    def wanted(cls, name: str, threads: int | None = None) -> "Device":
+        """The device of that name, with one thread per core unless told otherwise.
+
+        Raises:
+            InputError: Warp does not know it.
+        """
+        try:
+            wp.get_device(name)
+        except Exception as error:  # Warp raises several types for an unknown or absent device
+            raise InputError(f"device: expected one that Warp knows, found {name!r} ({error})") from None
+        # Cores this process may use, not those of the machine; not every system can tell.
+        allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        return cls(name, threads or allowed or 1)
+
+    @property
+    def is_cpu(self) -> bool:
+        """Whether rows run on CPU threads."""
+        return wp.get_device(self.name).is_cpu
+
+    def array(self, values: np.ndarray, dtype: type) -> wp.array:
+        """A copy on the device; vectors take the last axis."""
+        scalar = getattr(dtype, "_wp_scalar_type_", dtype)
+        host = np.int32 if scalar is int else wp.dtype_to_numpy(scalar)
+        return wp.array(np.ascontiguousarray(values, host), dtype=dtype, device=self.name)
+
+    def zeros(self, shape: int | tuple[int, ...], dtype: type) -> wp.array:
+        """Zeros on the device."""
+        return wp.zeros(shape, dtype=dtype, device=self.name)
+
+    def corners(self, rows: np.ndarray) -> wp.array:
+        """Corners in grid steps as vec3i.
+
+        Raises:
+            InputError: a coordinate beyond the grid (data/scene.py), where products of differences stop being exact.
+        """
+        check_coordinates(rows)
+        return self.array(np.asarray(rows).reshape(-1, 3), wp.vec3i)
+
+    def struct(self, kind: Callable[[], object], **columns: object) -> object:
+        """A Warp struct: its arrays are copies of the columns, or zeros of a given shape; other fields are as given."""
+        out = kind()
+        for name, values in columns.items():
+            dtype = getattr(kind.vars[name].type, "dtype", None)
+            if isinstance(values, int | tuple) and dtype is not None:
+                values = self.zeros(values, dtype)
+            elif isinstance(values, np.ndarray) and dtype is not None:
+                values = self.array(values, dtype)
+            setattr(out, name, values)
+        return out
 
 
-def triples(rows: np.ndarray, device: str) -> wp.array:
-    """Rows of any three integers, and boxes of a hierarchy, whose empty ones lie beyond the grid, as vec3i."""
-    return wp.array(np.ascontiguousarray(rows, np.int32).reshape(-1, 3), dtype=wp.vec3i, device=device)
+CPU = Device()
+# Warp greets whoever starts it, unless told not to before.
+wp.config.log_level = wp.LOG_WARNING
+
+
+def node_columns(hierarchy: Hierarchy) -> dict[str, np.ndarray]:
+    """Columns of a hierarchy as Warp structs name them; boxes of empty nodes lie beyond the grid."""
+    return {"node_lo": hierarchy.boxes[:, 0], "node_hi": hierarchy.boxes[:, 1], "links": hierarchy.links}
 
 
 def check_coordinates(values: np.ndarray) -> None:
@@ -63,45 +100,108 @@ def check_coordinates(values: np.ndarray) -> None:
         raise InputError(f"coordinates: expected at most {GRID_LIMIT} grid steps from the origin, found {most}")
 
 
-def run_sliced(
-    launch: Callable[[int, int, int, wp.array, wp.array], None],
-    count: int,
-    sizes: SlotSizes,
-    *,
-    module: str,
-    threads: int = 1,
-    device: str = "cpu",
-    chunk: int = CHUNK,
-) -> None:
-    """Call `launch(first, last, slots, scratch, frames)` until all items are done.
+@dataclass(frozen=True)
+class Scratch:
+    """What one slot needs: float64 values and integers."""
 
-    On a GPU with many slots at once. On the CPU in chunks from `threads` threads, one slot each: Warp runs a CPU launch
-    on the calling thread and releases the GIL. Items may not depend on each other, so the result does not depend on
+    values: int = 0
+    integers: int = 0
+
+    def arrays(self, slots: int, device: Device) -> list[wp.array]:
+        """Scratch of some slots: values, then integers; a kind that no slot needs is left out."""
+        kinds = ((self.values, wp.float64), (self.integers, int))
+        return [device.zeros(max(1, size * slots), dtype) for size, dtype in kinds if size]
+
+
+def launch_rows(
+    kernel: wp.Kernel, count: int, inputs: Sequence[object], outputs: Sequence[object], device: Device
+) -> None:
+    """Launch a kernel, one of its threads per row.
+
+    Its arguments are the inputs, `first`, and the outputs; its row is first + tid. Rows may not depend on each other.
+    """
+
+    def launch(first: int, last: int) -> None:
+        wp.launch(kernel, dim=last - first, inputs=[*inputs, first], outputs=outputs, device=device.name)
+
+    run_sliced(launch, count, kernel.module, device)
+
+
+def launch_slots(
+    kernel: wp.Kernel,
+    count: int,
+    inputs: Sequence[object],
+    scratch: Scratch,
+    outputs: Sequence[object],
+    device: Device,
+    *,
+    chunk: int = CHUNK,
+    gpu_chunk: int | None = None,
+) -> None:
+    """Launch a kernel whose threads are slots, each with scratch of its own, that share the rows.
+
+    Its arguments are the inputs, `first`, `last`, `slots`, the kinds of scratch that there are, and the outputs; its
+    rows are first + tid, first + tid + slots, ... below last. Rows may not depend on each other.
+
+    Args:
+        kernel: to launch.
+        count: rows.
+        inputs: before those.
+        scratch: of one slot.
+        outputs: after those.
+        device: where to.
+        chunk: rows that a CPU thread takes at a time, all of them in one slot.
+        gpu_chunk: rows per launch on a GPU; all by default.
+    """
+
+    def launch(first: int, last: int, slots: int, *kinds: wp.array) -> None:
+        wp.launch(kernel, slots, inputs=[*inputs, first, last, slots, *kinds], outputs=outputs, device=device.name)
+
+    run_sliced(launch, count, kernel.module, device, scratch=scratch, chunk=chunk, gpu_chunk=gpu_chunk)
+
+
+def run_sliced(
+    launch: Callable[..., None],
+    count: int,
+    module: wp.Module,
+    device: Device,
+    *,
+    scratch: Scratch | None = None,
+    chunk: int = CHUNK,
+    gpu_chunk: int | None = None,
+) -> None:
+    """Call `launch(first, last)`, or with scratch `launch(first, last, slots, *scratch)`, until all rows are done.
+
+    On a GPU with many slots at once. On the CPU in chunks from several threads, one slot each: Warp runs a CPU launch
+    on the calling thread and releases the GIL. Rows may not depend on each other, so the result does not depend on
     this.
     """
     if count == 0:
         return
-    wp.load_module(module, device=device)
-    if not wp.get_device(device).is_cpu:
-        step = count if chunk == CHUNK else chunk
-        slots = min(step, GPU_SLOTS)
-        scratch = scratch_for(sizes, slots, device)
+    module.load(wp.get_device(device.name))
+
+    def slotted(slots: int) -> tuple[object, ...]:
+        return () if scratch is None else (slots, *scratch.arrays(slots, device))
+
+    if not device.is_cpu:
+        step = min(gpu_chunk or count, count)
+        mine = slotted(min(step, GPU_SLOTS))
         for first in range(0, count, step):
-            launch(first, min(first + step, count), slots, *scratch)
-        wp.synchronize_device(device)
+            launch(first, min(first + step, count), *mine)
+        wp.synchronize_device(device.name)
         return
-    threads = max(1, min(threads, -(-count // chunk)))
+    threads = max(1, min(device.threads, -(-count // chunk)))
     starts = iter(range(0, count, chunk))
     lock = threading.Lock()
 
     def worker() -> None:
-        scratch = scratch_for(sizes, 1, device)
+        mine = slotted(1)
         while True:
             with lock:
                 first = next(starts, None)
             if first is None:
                 return
-            launch(first, min(first + chunk, count), 1, *scratch)
+            launch(first, min(first + chunk, count), *mine)
 
     if threads == 1:
         worker()
@@ -114,11 +214,3 @@ def run_sliced(
             # After Ctrl-C or an error the workers end with the chunk they are in.
             with lock:
                 starts = iter(())
-
-
-def scratch_for(sizes: SlotSizes, slots: int, device: str) -> tuple[wp.array, wp.array]:
-    """Scratch of some slots: float64 values and integers."""
-    return (
-        wp.zeros(sizes.values * slots, dtype=wp.float64, device=device),
-        wp.zeros(max(1, sizes.integers * slots), dtype=int, device=device),
-    )

@@ -14,39 +14,29 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ..data.ragged import places_of, starts_of
 from ..data.store import certificates
-from .graph import reflect_high, reflect_low
-from .launch import SlotSizes, run_sliced, triples, vectors
-from .stab import (
-    AT_M,
-    AT_W,
-    HIDDEN,
-    LEVEL_SIZE,
-    LISTS_SIZE,
-    POLYGON_SIZE,
-    STABBED,
-    append_box,
-    decide,
-    det_sign,
-    edge_cut,
-    offsets,
-    slope_cut,
-    start_level,
-    vec6d,
-    vec6i,
-)
+from ..data.verdict import Verdict
+from .blockers import BlockerTree, Ends, has_room
+from .directions import POLYGON_SIZE, det_sign, edge_cut
+from .launch import CPU, Device, Scratch, launch_slots
+from .stab import LEVEL_SIZE, load_counts, slope_cut
 from .target import (
+    AT_COUNTS,
+    EXHAUSTED,
     FRAME,
     MAX_BRANCHES,
     SLOT_SIZE,
-    WAYS,
-    BlockerTree,
+    STACK_SIZE,
     Pairs,
-    append_way,
-    has_room,
-    has_way,
-    possible_octant,
-    scan,
+    Slot,
+    can_lead,
+    device_pairs,
+    ends_of,
+    next_way,
+    open_node,
+    slot_at,
+    start_search,
 )
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -107,7 +97,7 @@ def triple_contradicts(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> bool:
 
 
 @wp.func
-def polygon_leaf(work: wp.array(dtype=f64), failing: int) -> wp.vec3i:
+def polygon_leaf(work: wp.array[f64], failing: int) -> wp.vec3i:
     """Tags of cuts that contradict each other, of a polygon and the cut that emptied it; -1 where there is no more."""
     polygon = int(work[failing + 4])
     count = int(work[polygon])
@@ -131,7 +121,7 @@ def polygon_leaf(work: wp.array(dtype=f64), failing: int) -> wp.vec3i:
 
 
 @wp.func
-def slopes_leaf(work: wp.array(dtype=f64), level: int) -> wp.vec3i:
+def slopes_leaf(work: wp.array[f64], level: int) -> wp.vec3i:
     """The same of two slope bounds that leave no direction."""
     for u in range(3):
         low = slope_cut(work, level, 2 * u)
@@ -146,7 +136,7 @@ def slopes_leaf(work: wp.array(dtype=f64), level: int) -> wp.vec3i:
 
 
 @wp.func
-def leaf_tags(work: wp.array(dtype=f64), level: int, failing: int) -> wp.vec3i:
+def leaf_tags(work: wp.array[f64], level: int, failing: int) -> wp.vec3i:
     """Tags of the contradiction that `decide` met; it marks slopes by the tag -2."""
     if work[failing + 3] == f64(-2.0):
         return slopes_leaf(work, level)
@@ -155,11 +145,10 @@ def leaf_tags(work: wp.array(dtype=f64), level: int, failing: int) -> wp.vec3i:
 
 @wp.func
 def write_leaf(
-    work: wp.array(dtype=f64), level: int, spare: int, words: wp.array(dtype=int), begin: wp.int64, size: int, room: int
+    level: int, spare: int, begin: wp.int64, size: int, room: int, work: wp.array[f64], words_out: wp.array[int]
 ) -> int:
     """Write the contradiction that `decide` met; words so far, or -1 if it cannot be told or has no room."""
-    failing = spare + 2 * POLYGON_SIZE
-    tags = leaf_tags(work, level, failing)
+    tags = leaf_tags(work, level, spare + 2 * POLYGON_SIZE)
     count = int(0)
     for k in range(3):
         if tags[k] >= 0:
@@ -167,99 +156,77 @@ def write_leaf(
     if count == 0 or size + count > room:
         return -1
     for k in range(count):
-        words[begin + wp.int64(size + k)] = -1 - tags[k]
-    words[begin + wp.int64(size)] = -1 - tags[0] - CUT_STEP * (count - 1)
+        words_out[begin + wp.int64(size + k)] = -1 - tags[k]
+    words_out[begin + wp.int64(size)] = -1 - tags[0] - CUT_STEP * (count - 1)
     return size + count
+
+
+@wp.func
+def write_octant(
+    tree: BlockerTree,
+    ends: Ends,
+    begin: wp.int64,
+    written: int,
+    room: int,
+    slot: Slot,
+    work: wp.array[f64],
+    frames: wp.array[int],
+    words_out: wp.array[int],
+) -> int:
+    """Write the tree of one octant after what is written; words so far, or -1 if it cannot be told or has no room."""
+    size = int(written)
+    answer = start_search(ends, slot, work, frames)
+    # The level that was decided last is that of depth + 2, the root's at depth -1.
+    depth = int(-1)
+    while answer != EXHAUSTED:
+        if answer == Verdict.UNKNOWN:
+            return -1
+        if answer == Verdict.HIDDEN:
+            level = slot.levels + (depth + 2) * LEVEL_SIZE
+            size = write_leaf(level, slot.spare, begin, size, room, work, words_out)
+            if size < 0:
+                return -1
+        else:
+            depth += 1
+            hit = open_node(tree, ends, depth, slot, work, frames)
+            full = not has_room(load_counts(frames, slot.stack + depth * FRAME + AT_COUNTS))
+            if hit[0] < 0 or depth >= MAX_BRANCHES or size >= room or full:
+                return -1
+            words_out[begin + wp.int64(size)] = NODE_STEP * hit[0] + hit[1]
+            size += 1
+        # The next way of the deepest node that has one left.
+        answer = EXHAUSTED
+        while depth >= 0 and answer == EXHAUSTED:
+            answer = next_way(tree, ends, depth, slot, work, frames)
+            if answer == EXHAUSTED:
+                depth -= 1
+    return size
 
 
 @wp.kernel
 def _write(
     tree: BlockerTree,
     pairs: Pairs,
+    starts: wp.array[wp.int64],
     first: int,
     last: int,
-    work: wp.array(dtype=f64),
-    frames: wp.array(dtype=int),
-    starts: wp.array(dtype=wp.int64),
-    words: wp.array(dtype=int),
-    sizes: wp.array(dtype=int),
+    slots: int,
+    work: wp.array[f64],
+    frames: wp.array[int],
+    words_out: wp.array[int],
+    sizes_out: wp.array[int],
 ):
-    slot = wp.tid()
-    levels = slot * SLOT_SIZE
-    lists = levels + (MAX_BRANCHES + 2) * LEVEL_SIZE
-    spare = lists + LISTS_SIZE
-    stack = slot * (MAX_BRANCHES + 2) * FRAME
-    slots = work.shape[0] // SLOT_SIZE
-    row = first + slot
+    slot = slot_at(wp.tid())
+    row = first + wp.tid()
     while row < last:
-        pair = pairs.rows[row]
         begin = starts[row]
         room = int(starts[row + 1] - begin)
         size = int(0)
-        octant = int(0)
-        while octant < 8:
-            if size >= 0 and possible_octant(
-                pairs.lo[pair[0]], pairs.hi[pair[0]], pairs.lo[pair[1]], pairs.hi[pair[1]], octant
-            ):
-                s_lo = reflect_low(pairs.lo[pair[0]], pairs.hi[pair[0]], octant)
-                s_hi = reflect_high(pairs.lo[pair[0]], pairs.hi[pair[0]], octant)
-                t_lo = reflect_low(pairs.lo[pair[1]], pairs.hi[pair[1]], octant)
-                t_hi = reflect_high(pairs.lo[pair[1]], pairs.hi[pair[1]], octant)
-                grown = append_box(work, lists, vec6i(), s_lo, s_hi, -1)
-                grown = append_box(work, lists, grown, t_lo, t_hi, -1)
-                start_level(work, levels)
-                # The level that was decided last is that of depth + 1, the root's at depth -1.
-                answer = decide(work, lists, levels, levels + LEVEL_SIZE, spare, vec6i(), grown)
-                depth = int(-1)
-                searching = bool(True)
-                while searching:
-                    if answer == HIDDEN:
-                        size = write_leaf(work, levels + (depth + 2) * LEVEL_SIZE, spare, words, begin, size, room)
-                    elif answer == STABBED:
-                        depth += 1
-                        at = stack + depth * FRAME
-                        level = levels + (depth + 1) * LEVEL_SIZE
-                        w = wp.vec3d(work[level + AT_W], work[level + AT_W + 1], work[level + AT_W + 2])
-                        m = vec6d()
-                        for p in range(6):
-                            m[p] = work[level + AT_M + p]
-                            frames[at + 3 + p] = grown[p]
-                        hit = scan(tree, w, offsets(m), octant, s_lo, s_hi, t_lo, t_hi, pair[2])
-                        frames[at] = hit[0]
-                        frames[at + 1] = 0
-                        frames[at + 2] = hit[1]
-                        if hit[0] < 0 or depth >= MAX_BRANCHES or size >= room or not has_room(grown):
-                            size = -1
-                        else:
-                            words[begin + wp.int64(size)] = NODE_STEP * hit[0] + hit[1]
-                            size += 1
-                    else:
-                        size = -1
-                    # The next way that exists, of the deepest node that has one left.
-                    searching = bool(False)
-                    while size >= 0 and depth >= 0 and not searching:
-                        at = stack + depth * FRAME
-                        cursor = frames[at + 1]
-                        if cursor == WAYS:
-                            depth -= 1
-                        else:
-                            frames[at + 1] = cursor + 1
-                            blocker = frames[at]
-                            lo = reflect_low(tree.lo[blocker], tree.hi[blocker], octant)
-                            hi = reflect_high(tree.lo[blocker], tree.hi[blocker], octant)
-                            axis = tree.axis[blocker]
-                            if has_way(cursor, lo[axis], axis, s_hi, t_lo, pair[2]):
-                                counts = vec6i()
-                                for p in range(6):
-                                    counts[p] = frames[at + 3 + p]
-                                grown = append_way(
-                                    work, lists, counts, lo, hi, axis, frames[at + 2], cursor, s_hi, t_lo
-                                )
-                                level = levels + (depth + 1) * LEVEL_SIZE
-                                answer = decide(work, lists, level, level + LEVEL_SIZE, spare, counts, grown)
-                                searching = bool(True)
-            octant += 1
-        sizes[row] = size
+        for octant in range(8):
+            ends = ends_of(pairs, row, octant)
+            if size >= 0 and can_lead(ends):
+                size = write_octant(tree, ends, begin, size, room, slot, work, frames, words_out)
+        sizes_out[row] = size
         row += slots
 
 
@@ -277,13 +244,7 @@ class LineTrees:
 
 
 def launch_line_trees(
-    tree: BlockerTree,
-    boxes: np.ndarray,
-    rows: np.ndarray,
-    nodes: np.ndarray,
-    *,
-    threads: int = 1,
-    device: str = "cpu",
+    tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, nodes: np.ndarray, *, device: Device = CPU
 ) -> LineTrees:
     """Certificates of pairs that the target search called hidden.
 
@@ -292,8 +253,7 @@ def launch_line_trees(
         boxes: as of `launch_target_search`.
         rows: hidden rows of that search, shape (n, 3), int.
         nodes: lines that it tried for each of them, shape (n,), int.
-        threads: CPU threads; ignored on a GPU.
-        device: Warp device.
+        device: where to.
 
     Returns:
         A tree for every row. One without words could not be told: its pair has no certificate.
@@ -305,34 +265,22 @@ def launch_line_trees(
     sizes, words = [np.zeros(0, np.int64)], [np.zeros(0, np.int32)]
     begin = 0
     while begin < len(rows):
-        ends = np.cumsum(room[begin:])
-        count = max(1, int(np.searchsorted(ends, MOST_WORDS, side="right")))
-        part = _write_part(tree, boxes, rows[begin : begin + count], ends[:count], threads, device)
+        count = max(1, int(np.searchsorted(np.cumsum(room[begin:]), MOST_WORDS, side="right")))
+        part = _write_part(tree, boxes, rows[begin : begin + count], room[begin : begin + count], device)
         sizes.append(part[0])
         words.append(part[1])
         begin += count
-    return LineTrees(np.concatenate([[0], np.cumsum(np.concatenate(sizes))]), np.concatenate(words))
+    return LineTrees(starts_of(np.concatenate(sizes)), np.concatenate(words))
 
 
 def _write_part(
-    tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, ends: np.ndarray, threads: int, device: str
+    tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, room: np.ndarray, device: Device
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Words of each row's tree, and all of them; row i may use those up to ends[i]."""
-    work = Pairs()
-    work.lo, work.hi = vectors(boxes[:, 0], device), vectors(boxes[:, 1], device)
-    work.rows = triples(rows, device)
-    starts = np.concatenate([[0], ends])
-    places = wp.array(starts, dtype=wp.int64, device=device)
-    words = wp.empty(int(ends[-1]), dtype=int, device=device)
-    sizes = wp.zeros(len(rows), dtype=int, device=device)
-
-    def launch(first: int, last: int, slots: int, scratch: wp.array, frames: wp.array) -> None:
-        wp.launch(
-            _write, dim=slots, inputs=[tree, work, first, last, scratch, frames, places, words, sizes], device=device
-        )
-
-    scratch = SlotSizes(int(SLOT_SIZE), (int(MAX_BRANCHES) + 2) * int(FRAME))
-    run_sliced(launch, len(rows), scratch, module=__name__, threads=threads, device=device)
+    """Number of words of each row's tree, and all words; row i may use room[i]."""
+    starts = starts_of(room)
+    words = wp.empty(int(starts[-1]), dtype=int, device=device.name)
+    sizes = device.zeros(len(rows), int)
+    inputs = [tree, device_pairs(boxes, rows, device), device.array(starts, wp.int64)]
+    launch_slots(_write, len(rows), inputs, Scratch(int(SLOT_SIZE), int(STACK_SIZE)), [words, sizes], device)
     used = np.maximum(sizes.numpy(), 0).astype(np.int64)
-    at = np.repeat(starts[:-1] - np.cumsum(used) + used, used) + np.arange(used.sum())
-    return used, words.numpy()[at]
+    return used, words.numpy()[places_of(starts[:-1], used)]

@@ -9,8 +9,9 @@ import numpy as np
 import warp as wp
 
 from ..data.errors import InputError
+from ..data.verdict import Verdict
 from .coverage import CubeMaps, Maps, border, level_start
-from .launch import SlotSizes, run_sliced, vectors
+from .launch import launch_rows
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -122,42 +123,38 @@ def _occludees(
     maps: Maps,
     size: int,
     levels: int,
-    boxes_low: wp.array(dtype=wp.vec3i),
-    boxes_high: wp.array(dtype=wp.vec3i),
-    rows: wp.array(dtype=wp.vec2i),
+    boxes_low: wp.array[wp.vec3i],
+    boxes_high: wp.array[wp.vec3i],
+    rows: wp.array[wp.vec2i],
     first: int,
-    last: int,
-    slots: int,
-    hidden_out: wp.array(dtype=wp.uint8),
+    verdict_out: wp.array[wp.uint8],
 ):
     row = first + wp.tid()
-    while row < last:
-        pair = rows[row]
-        eye = maps.viewpoints[pair[1]]
-        low = wp.vec3d()
-        high = wp.vec3d()
-        for c in range(3):
-            a = f64(boxes_low[pair[0]][c])
-            b = f64(boxes_high[pair[0]][c])
-            low[c] = a - eye[c] - (wp.abs(a) + wp.abs(eye[c])) * WIDENED
-            high[c] = b - eye[c] + (wp.abs(b) + wp.abs(eye[c])) * WIDENED
-        hidden_out[row] = wp.uint8(0)
-        if map_covers(maps, pair[1], size, levels, low, high):
-            hidden_out[row] = wp.uint8(1)
-        row += slots
+    pair = rows[row]
+    eye = maps.viewpoints[pair[1]]
+    low = wp.vec3d()
+    high = wp.vec3d()
+    for c in range(3):
+        a = f64(boxes_low[pair[0]][c])
+        b = f64(boxes_high[pair[0]][c])
+        low[c] = a - eye[c] - (wp.abs(a) + wp.abs(eye[c])) * WIDENED
+        high[c] = b - eye[c] + (wp.abs(b) + wp.abs(eye[c])) * WIDENED
+    verdict_out[row] = wp.uint8(Verdict.UNKNOWN)
+    if map_covers(maps, pair[1], size, levels, low, high):
+        verdict_out[row] = wp.uint8(Verdict.HIDDEN)
 
 
-def launch_occludees(maps: CubeMaps, boxes: np.ndarray, rows: np.ndarray, *, threads: int = 1) -> np.ndarray:
-    """Whether a map covers a box: everything in it lies behind a polygon, as seen from the map's viewpoint.
+def launch_occludees(maps: CubeMaps, boxes: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Verdicts on boxes that a map covers: everything in them lies behind a polygon, as seen from the map's viewpoint.
 
     Args:
         maps: from `launch_coverage`.
         boxes: closed boxes [grid steps], shape (n, 2, 3), int32.
         rows: (box, map), shape (m, 2), int.
-        threads: CPU threads.
 
     Returns:
-        Shape (m,), uint8. 1 is never wrong; 0 may be. Boxes that hold the viewpoint, on their boundary too, give 0.
+        `Verdict` of each row, shape (m,), uint8. HIDDEN is never wrong; UNKNOWN says nothing. Boxes that hold the
+        viewpoint, on their boundary too, are UNKNOWN.
 
     Raises:
         InputError: a shape, or a row that names no box or no map.
@@ -168,14 +165,8 @@ def launch_occludees(maps: CubeMaps, boxes: np.ndarray, rows: np.ndarray, *, thr
     limits = (len(boxes), len(maps.arrays.viewpoints))
     if len(rows) and ((rows < 0).any() or (rows.max(axis=0) >= limits).any()):
         raise InputError(f"rows: expected pairs below {limits}, found {rows.min(axis=0)} to {rows.max(axis=0)}")
-    low, high = (vectors(boxes[:, end], maps.device) for end in (0, 1))
-    pairs = wp.array(rows, dtype=wp.vec2i, device=maps.device)
-    hidden = wp.zeros(len(rows), dtype=wp.uint8, device=maps.device)
-    levels = maps.resolution.bit_length() - 1
-
-    def launch(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
-        inputs = [maps.arrays, maps.resolution, levels, low, high, pairs, first, last, slots, hidden]
-        wp.launch(_occludees, dim=slots, inputs=inputs, device=maps.device)
-
-    run_sliced(launch, len(rows), SlotSizes(1, 1), module=__name__, threads=threads, device=maps.device)
-    return hidden.numpy()
+    low, high = (maps.device.corners(boxes[:, end]) for end in (0, 1))
+    verdict = maps.device.zeros(len(rows), wp.uint8)
+    inputs = [maps.arrays, maps.resolution, maps.resolution.bit_length() - 1, low, high]
+    launch_rows(_occludees, len(rows), [*inputs, maps.device.array(rows, wp.vec2i)], [verdict], maps.device)
+    return verdict.numpy()

@@ -20,7 +20,7 @@ import numpy as np
 import warp as wp
 
 from ..data.errors import InputError
-from .launch import SlotSizes, run_sliced
+from .launch import CPU, Device, Scratch, launch_slots
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -34,8 +34,8 @@ BOUNDS_MARGIN = wp.constant(wp.float64(1.0e-6))
 class Cameras:
     """Eyes [grid steps], right-up-forward axes, and the screen; focal length and size [pixels], near [grid steps]."""
 
-    eyes: wp.array(dtype=wp.vec3d)
-    axes: wp.array(dtype=wp.mat33d)
+    eyes: wp.array[wp.vec3d]
+    axes: wp.array[wp.mat33d]
     focal: wp.float64
     near: wp.float64
     width: int
@@ -46,8 +46,8 @@ class Cameras:
 class DrawCalls:
     """Calls of frame f are starts[f] : starts[f + 1]; each draws triangles first : last as an object."""
 
-    starts: wp.array(dtype=int)
-    calls: wp.array(dtype=wp.vec3i)
+    starts: wp.array[int]
+    calls: wp.array[wp.vec3i]
 
 
 @wp.func
@@ -102,9 +102,9 @@ def draw_triangle(
     c: wp.vec3d,
     rows: wp.vec2i,
     object: int,
-    depths: wp.array(dtype=wp.float64),
+    depths: wp.array[wp.float64],
     lane: wp.vec2i,
-    frame_ids_out: wp.array(dtype=int),
+    frame_ids_out: wp.array[int],
 ) -> int:
     """Draw rows first : last; the number of pixel centres that the triangle covers. Lane: slots, slot."""
     n_a = wp.cross(b, c)
@@ -152,14 +152,14 @@ def draw_triangle(
 def _raster(
     cameras: Cameras,
     draws: DrawCalls,
-    triangles: wp.array2d(dtype=wp.vec3i),
+    triangles: wp.array2d[wp.vec3i],
     bands: int,
-    depths: wp.array(dtype=wp.float64),
     first: int,
     last: int,
     slots: int,
-    ids_out: wp.array2d(dtype=int),
-    fragments_out: wp.array(dtype=wp.int64),
+    depths: wp.array[wp.float64],
+    ids_out: wp.array2d[int],
+    fragments_out: wp.array[wp.int64],
 ):
     lane = wp.vec2i(slots, wp.tid())
     item = first + wp.tid()
@@ -197,9 +197,9 @@ class Images:
     fragments: np.ndarray
 
 
-def device_triangles(triangles: np.ndarray, device: str = "cpu") -> wp.array:
+def device_triangles(triangles: np.ndarray, device: Device = CPU) -> wp.array:
     """Triangles [grid steps], shape (m, 3, 3), int32, as `launch_raster` takes them."""
-    return wp.array(np.ascontiguousarray(triangles, np.int32).reshape(-1, 3, 3), dtype=wp.vec3i, device=device)
+    return device.array(np.asarray(triangles).reshape(-1, 3, 3), wp.vec3i)
 
 
 def launch_raster(
@@ -213,8 +213,7 @@ def launch_raster(
     height: int,
     focal: float,
     near: float,
-    threads: int = 1,
-    device: str = "cpu",
+    device: Device = CPU,
 ) -> Images:
     """The object that each pixel of each frame shows.
 
@@ -228,8 +227,7 @@ def launch_raster(
         height: [pixels].
         focal: [pixels], see `data.camera.Screen`.
         near: depth before which nothing is drawn [grid steps], > 0.
-        threads: CPU threads, which share the frames; one frame is drawn by one thread.
-        device: Warp device; on a GPU a thread draws a row.
+        device: where to. CPU threads share the frames, one frame is drawn by one thread; on a GPU a thread draws a row.
 
     Returns:
         Images. The object is that of the ray through the pixel's centre, but where the centre lies within rounding
@@ -254,22 +252,15 @@ def launch_raster(
         raise InputError(
             f"screen: expected sizes, focal length and near above 0; found {width}, {height}, {focal}, {near}"
         )
-    cameras, draws = Cameras(), DrawCalls()
-    cameras.eyes = wp.array(np.ascontiguousarray(eyes, np.float64), dtype=wp.vec3d, device=device)
-    cameras.axes = wp.array(np.ascontiguousarray(axes, np.float64), dtype=wp.mat33d, device=device)
-    cameras.focal, cameras.near, cameras.width, cameras.height = focal, near, width, height
-    draws.starts = wp.array(starts.astype(np.int32), dtype=int, device=device)
-    draws.calls = wp.array(np.ascontiguousarray(calls, np.int32), dtype=wp.vec3i, device=device)
-    bands = 1 if wp.get_device(device).is_cpu else height
-    ids = wp.full((frames, width * height), -1, dtype=int, device=device)
-    fragments = wp.zeros(frames * bands, dtype=wp.int64, device=device)
-
-    def launch(first: int, last: int, slots: int, depths: wp.array, _integers: wp.array) -> None:
-        inputs = [cameras, draws, triangles, bands, depths, first, last, slots, ids, fragments]
-        wp.launch(_raster, dim=slots, inputs=inputs, device=device)
-
-    sizes = SlotSizes(width * -(-height // bands), 0)
-    chunk = 1 if bands == 1 else 8191
-    run_sliced(launch, frames * bands, sizes, module=__name__, threads=threads, device=device, chunk=chunk)
+    screen = {"focal": focal, "near": near, "width": width, "height": height}
+    cameras = device.struct(Cameras, eyes=np.asarray(eyes), axes=np.asarray(axes), **screen)
+    draws = device.struct(DrawCalls, starts=starts, calls=calls)
+    bands = 1 if device.is_cpu else height
+    ids = wp.full((frames, width * height), -1, dtype=int, device=device.name)
+    fragments = device.zeros(frames * bands, wp.int64)
+    scratch = Scratch(width * -(-height // bands))
+    launch_slots(
+        _raster, frames * bands, [cameras, draws, triangles, bands], scratch, [ids, fragments], device, chunk=1
+    )
     counted = fragments.numpy().reshape(frames, bands).sum(axis=1)
     return Images(ids.numpy().reshape(frames, height, width), counted)

@@ -37,7 +37,7 @@ import numpy as np
 import warp as wp
 
 from ..data.errors import InputError
-from .launch import CHUNK, GPU_SLOTS, SlotSizes, run_sliced
+from .launch import CHUNK, CPU, GPU_SLOTS, Device, Scratch, launch_slots
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -63,10 +63,10 @@ GPU_ENTRIES = 2**28
 class Knapsacks:
     """The frames' problems; costs and budgets count from the cheapest set and are whole."""
 
-    benefits: wp.array2d(dtype=wp.float64)
-    costs: wp.array(dtype=wp.float64)
-    starts: wp.array(dtype=int)
-    budgets: wp.array(dtype=wp.float64)
+    benefits: wp.array2d[wp.float64]
+    costs: wp.array[wp.float64]
+    starts: wp.array[int]
+    budgets: wp.array[wp.float64]
 
 
 @wp.struct
@@ -102,11 +102,11 @@ class Step:
 class Answers:
     """One row a frame; costs count from the cheapest set."""
 
-    choices: wp.array2d(dtype=int)
-    values: wp.array(dtype=wp.float64)
-    costs: wp.array(dtype=wp.float64)
-    bounds: wp.array(dtype=wp.float64)
-    prices: wp.array(dtype=wp.float64)
+    choices: wp.array2d[int]
+    values: wp.array[wp.float64]
+    costs: wp.array[wp.float64]
+    bounds: wp.array[wp.float64]
+    prices: wp.array[wp.float64]
 
 
 @wp.func
@@ -144,7 +144,7 @@ def cheapest_level(knapsacks: Knapsacks, frame: int, g: int) -> int:
 
 
 @wp.func
-def open_bracket(knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), lane: wp.vec3i) -> Bracket:
+def open_bracket(knapsacks: Knapsacks, frame: int, scratch: wp.array[int], lane: wp.vec3i) -> Bracket:
     """Most beneficial levels in row 0, cheapest in row 1, and prices at which they are best."""
     found = Bracket()
     found.lo = 0
@@ -185,7 +185,7 @@ def open_bracket(knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int),
 def split(
     knapsacks: Knapsacks,
     frame: int,
-    scratch: wp.array(dtype=int),
+    scratch: wp.array[int],
     lane: wp.vec3i,
     ends: Bracket,
     price: wp.float64,
@@ -226,9 +226,7 @@ def split(
 
 
 @wp.func
-def close_bracket(
-    knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), lane: wp.vec3i, opened: Bracket
-) -> Bracket:
+def close_bracket(knapsacks: Knapsacks, frame: int, scratch: wp.array[int], lane: wp.vec3i, opened: Bracket) -> Bracket:
     """Bring the two prices together: objects that then differ are indifferent at value / cost."""
     ends = opened
     bisect = bool(False)
@@ -266,9 +264,7 @@ def close_bracket(
 
 
 @wp.func
-def switch_while_fits(
-    knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), lane: wp.vec3i, ends: Bracket
-) -> int:
+def switch_while_fits(knapsacks: Knapsacks, frame: int, scratch: wp.array[int], lane: wp.vec3i, ends: Bracket) -> int:
     """Move objects of row hi to their levels of row lo where they fit; the first that does not (one never does)."""
     left = knapsacks.budgets[frame] - ends.spent
     stopped = int(-1)
@@ -286,7 +282,7 @@ def switch_while_fits(
 
 
 @wp.func
-def row_cost(knapsacks: Knapsacks, scratch: wp.array(dtype=int), lane: wp.vec3i, row: int) -> wp.float64:
+def row_cost(knapsacks: Knapsacks, scratch: wp.array[int], lane: wp.vec3i, row: int) -> wp.float64:
     """Cost of a row above the cheapest set."""
     cost = f64(0.0)
     for g in range(lane[0]):
@@ -304,7 +300,7 @@ def plus(total: wp.vec2d, term: wp.float64) -> wp.vec2d:
 
 
 @wp.func
-def row_value(knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), lane: wp.vec3i, row: int) -> wp.float64:
+def row_value(knapsacks: Knapsacks, frame: int, scratch: wp.array[int], lane: wp.vec3i, row: int) -> wp.float64:
     """Benefit of a row."""
     total = wp.vec2d(f64(0.0), f64(0.0))
     for g in range(lane[0]):
@@ -313,7 +309,7 @@ def row_value(knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), la
 
 
 @wp.func
-def fill(knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), lane: wp.vec3i, row: int):
+def fill(knapsacks: Knapsacks, frame: int, scratch: wp.array[int], lane: wp.vec3i, row: int):
     """Spend what is left of the budget: the level that gains most, some times over."""
     left = knapsacks.budgets[frame] - row_cost(knapsacks, scratch, lane, row)
     rounds = int(0)
@@ -343,7 +339,7 @@ def fill(knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), lane: w
 
 
 @wp.func
-def trade(knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), lane: wp.vec3i, row: int):
+def trade(knapsacks: Knapsacks, frame: int, scratch: wp.array[int], lane: wp.vec3i, row: int):
     """Bring a row that costs too much into the budget by the one level that loses least; one must exist."""
     over = row_cost(knapsacks, scratch, lane, row) - knapsacks.budgets[frame]
     object = int(-1)
@@ -364,7 +360,7 @@ def trade(knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), lane: 
 
 
 @wp.func
-def single_upgrade(knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), lane: wp.vec3i, row: int):
+def single_upgrade(knapsacks: Knapsacks, frame: int, scratch: wp.array[int], lane: wp.vec3i, row: int):
     """The cheapest set with the one level that gains most."""
     object = int(-1)
     chosen = int(-1)
@@ -411,7 +407,7 @@ def dual_value(knapsacks: Knapsacks, frame: int, lane: wp.vec3i, price: wp.float
 
 @wp.func
 def solve(
-    knapsacks: Knapsacks, frame: int, scratch: wp.array(dtype=int), lane: wp.vec3i, opened: Bracket, improve: bool
+    knapsacks: Knapsacks, frame: int, scratch: wp.array[int], lane: wp.vec3i, opened: Bracket, improve: bool
 ) -> wp.vec2d:
     """Row of the best selection found, and the price, where the most beneficial levels do not fit."""
     ends = close_bracket(knapsacks, frame, scratch, lane, opened)
@@ -440,10 +436,10 @@ def solve(
 def _select(
     knapsacks: Knapsacks,
     improve: bool,
-    scratch: wp.array(dtype=int),
     first: int,
     last: int,
     slots: int,
+    scratch: wp.array[int],
     answers_out: Answers,
 ):
     objects = knapsacks.starts.shape[0] - 1
@@ -504,8 +500,7 @@ def launch_select(
     budgets: np.ndarray | int,
     *,
     improve: bool = True,
-    threads: int = 1,
-    device: str = "cpu",
+    device: Device = CPU,
 ) -> Selections:
     """Levels of detail of much benefit within each frame's budget of cost, with a bound on what the best could gain.
 
@@ -522,8 +517,7 @@ def launch_select(
         budgets: of each frame, or one for all, shape (frames,), whole numbers >= 0.
         improve: spend what is left by single changes of level; cannot make the selection worse. Without it a frame
             takes about a third less time and the gap is ten times as large and more.
-        threads: CPU threads, which share the frames.
-        device: Warp device; one GPU thread solves one frame.
+        device: where to. CPU threads share the frames; one GPU thread solves one frame.
 
     Raises:
         InputError: a shape, an object without levels, starts out of order, a benefit that is not finite, a cost or
@@ -537,34 +531,28 @@ def launch_select(
     least = np.minimum.reduceat(cost, first[:-1]) if objects else cost
     above = (cost - np.repeat(least, np.diff(first))).astype(np.float64)
     spare = np.clip(budget - least.sum(), -1, COST_LIMIT).astype(np.float64)
-    on_cpu = wp.get_device(device).is_cpu
-    knapsacks = Knapsacks()
-    knapsacks.costs = wp.array(above, dtype=wp.float64, device=device)
-    knapsacks.starts = wp.array(first, dtype=int, device=device)
-    knapsacks.budgets = wp.array(spare, dtype=wp.float64, device=device)
-    answers = Answers()
-    if on_cpu:
-        knapsacks.benefits = wp.array(benefit, dtype=wp.float64, device=device, copy=False)
-        answers.choices = wp.zeros((frames, objects), dtype=int, device=device)
+    knapsacks, answers = Knapsacks(), Answers()
+    knapsacks.costs, knapsacks.budgets = device.array(above, f64), device.array(spare, f64)
+    knapsacks.starts = device.array(first, int)
+    if device.is_cpu:
+        knapsacks.benefits = wp.array(benefit, dtype=f64, device=device.name, copy=False)
+        answers.choices = device.zeros((frames, objects), int)
     else:
         # Threads of a GPU are frames: what neighbours read and write lies side by side.
-        knapsacks.benefits = wp.array(np.ascontiguousarray(benefit.T), dtype=wp.float64, device=device).transpose()
-        answers.choices = wp.zeros((objects, frames), dtype=int, device=device).transpose()
-    answers.values, answers.costs, answers.bounds, answers.prices = (
-        wp.zeros(frames, dtype=wp.float64, device=device) for _ in range(4)
+        knapsacks.benefits = device.array(benefit.T, f64).transpose()
+        answers.choices = device.zeros((objects, frames), int).transpose()
+    answers.values, answers.costs, answers.bounds, answers.prices = (device.zeros(frames, f64) for _ in range(4))
+    launch_slots(
+        _select,
+        frames,
+        [knapsacks, improve],
+        Scratch(0, max(1, ROWS * objects)),
+        [answers],
+        device,
+        chunk=max(1, min(CHUNK, CPU_LEVELS // max(1, len(cost)))),
+        # Scratch may have no room for all frames at once.
+        gpu_chunk=max(1, min(GPU_SLOTS, GPU_ENTRIES // max(1, objects))),
     )
-
-    def launch(begin: int, end: int, slots: int, _values: wp.array, scratch: wp.array) -> None:
-        inputs = [knapsacks, improve, scratch, begin, end, slots, answers]
-        wp.launch(_select, dim=slots, inputs=inputs, device=device)
-
-    sizes = SlotSizes(0, ROWS * objects)
-    most = CPU_LEVELS // max(1, len(cost)) if on_cpu else GPU_ENTRIES // max(1, objects)
-    chunk = max(1, min(CHUNK if on_cpu else GPU_SLOTS, most))
-    if chunk == CHUNK and not on_cpu:
-        # By this `run_sliced` would give a GPU all frames at once; scratch may have no room for them.
-        chunk -= 1
-    run_sliced(launch, frames, sizes, module=__name__, threads=threads, device=device, chunk=chunk)
     return _selections(answers, int(least.sum()), spare >= 0)
 
 

@@ -7,13 +7,11 @@ be clear. (The exact check of every stored witness is verify/exact/sightline.py,
 Source of the bound: Shewchuk 1997, "Adaptive Precision Floating-Point Arithmetic", orient3d, stage A.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import warp as wp
 
 from ..data.hierarchy import build_hierarchy
-from .launch import SlotSizes, check_coordinates, run_sliced, triples, vectors
+from .launch import CPU, Device, check_coordinates, launch_rows, node_columns
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -38,24 +36,20 @@ PROLONGED = wp.constant(wp.float64(1.0005))
 class Triangles:
     """Opaque triangles in grid steps, who owns them, and their hierarchy."""
 
-    a: wp.array(dtype=wp.vec3i)
-    b: wp.array(dtype=wp.vec3i)
-    c: wp.array(dtype=wp.vec3i)
-    owner: wp.array(dtype=int)
-    node_lo: wp.array(dtype=wp.vec3i)
-    node_hi: wp.array(dtype=wp.vec3i)
-    links: wp.array(dtype=wp.vec2i)
+    a: wp.array[wp.vec3i]
+    b: wp.array[wp.vec3i]
+    c: wp.array[wp.vec3i]
+    owner: wp.array[int]
+    node_lo: wp.array[wp.vec3i]
+    node_hi: wp.array[wp.vec3i]
+    links: wp.array[wp.vec2i]
 
 
-def device_triangles(triangles: np.ndarray, owners: np.ndarray, device: str = "cpu") -> Triangles:
+def device_triangles(triangles: np.ndarray, owners: np.ndarray, device: Device = CPU) -> Triangles:
     """Copy opaque triangles (m, 3, 3) [grid steps] and their object ids to a device."""
     nodes = build_hierarchy(np.stack([triangles.min(axis=1), triangles.max(axis=1)], axis=1))
-    out = Triangles()
-    out.a, out.b, out.c = (vectors(triangles[:, i], device) for i in range(3))
-    out.owner = wp.array(owners, dtype=int, device=device)
-    out.node_lo, out.node_hi = triples(nodes.boxes[:, 0], device), triples(nodes.boxes[:, 1], device)
-    out.links = wp.array(nodes.links, dtype=wp.vec2i, device=device)
-    return out
+    a, b, c = (device.corners(triangles[:, i]) for i in range(3))
+    return device.struct(Triangles, a=a, b=b, c=c, owner=owners, **node_columns(nodes))
 
 
 @wp.func
@@ -161,20 +155,16 @@ def quantised(v: wp.vec3d) -> wp.vec3d:
 @wp.kernel
 def _confirm(
     scene: Triangles,
-    origins: wp.array(dtype=wp.vec3d),
-    ends: wp.array(dtype=wp.vec3d),
-    except_owner: wp.array(dtype=int),
+    origins: wp.array[wp.vec3d],
+    ends: wp.array[wp.vec3d],
+    except_owner: wp.array[int],
     first: int,
-    last: int,
-    slots: int,
-    clear_out: wp.array(dtype=wp.uint8),
+    clear_out: wp.array[wp.uint8],
 ):
     row = first + wp.tid()
-    while row < last:
-        clear_out[row] = wp.uint8(0)
-        if obstacle(scene, origins[row], ends[row], except_owner[row]) < 0:
-            clear_out[row] = wp.uint8(1)
-        row += slots
+    clear_out[row] = wp.uint8(0)
+    if obstacle(scene, origins[row], ends[row], except_owner[row]) < 0:
+        clear_out[row] = wp.uint8(1)
 
 
 @wp.func
@@ -196,20 +186,48 @@ def holds(lo: wp.vec3i, hi: wp.vec3i, point: wp.vec3d) -> bool:
 
 
 @wp.struct
+class AimTargets:
+    """Triangles of all objects that may be aimed at, opaque or not, grouped by object, with their running area."""
+
+    a: wp.array[wp.vec3i]
+    b: wp.array[wp.vec3i]
+    c: wp.array[wp.vec3i]
+    running_area: wp.array[f64]
+
+
+def aim_targets(triangles: np.ndarray, device: Device = CPU) -> AimTargets:
+    """Copy the triangles (m, 3, 3) of all objects, in object order, to a device."""
+    edges = (triangles[:, 1:] - triangles[:, :1]).astype(float)
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    a, b, c = (device.corners(triangles[:, i]) for i in range(3))
+    return device.struct(AimTargets, a=a, b=b, c=c, running_area=np.cumsum(area))
+
+
+@wp.struct
 class Aims:
     """Work of `launch_aim`: source and target boxes, object to hit (-1: none), and the object's triangle range."""
 
-    source_lo: wp.array(dtype=wp.vec3i)
-    source_hi: wp.array(dtype=wp.vec3i)
-    target_lo: wp.array(dtype=wp.vec3i)
-    target_hi: wp.array(dtype=wp.vec3i)
-    hint_origin: wp.array(dtype=wp.vec3d)
-    hint_end: wp.array(dtype=wp.vec3d)
-    owner: wp.array(dtype=int)
-    begin: wp.array(dtype=int)
-    end: wp.array(dtype=int)
-    seed: wp.array(dtype=int)
-    near: wp.array(dtype=int)
+    source_lo: wp.array[wp.vec3i]
+    source_hi: wp.array[wp.vec3i]
+    target_lo: wp.array[wp.vec3i]
+    target_hi: wp.array[wp.vec3i]
+    hint_origin: wp.array[wp.vec3d]
+    hint_end: wp.array[wp.vec3d]
+    owner: wp.array[int]
+    begin: wp.array[int]
+    end: wp.array[int]
+    seed: wp.array[int]
+    near: wp.array[int]
+
+
+@wp.struct
+class Aim:
+    """One attempt: where the sightline starts and ends, on which triangle, and the random state after it was drawn."""
+
+    origin: wp.vec3d
+    end: wp.vec3d
+    triangle: int
+    state: wp.uint32
 
 
 @wp.func
@@ -218,119 +236,145 @@ def pull(point: wp.vec3d, hint: wp.vec3d, reach: f64) -> wp.vec3d:
     return hint + (point - hint) * reach
 
 
+@wp.func
+def pick_triangle(targets: AimTargets, begin: int, end: int, share: f64) -> int:
+    """Triangle of a range below whose part of the range's area a share of it lies."""
+    low = int(begin)
+    high = int(end - 1)
+    before = f64(0.0)
+    if low > 0:
+        before = targets.running_area[low - 1]
+    pick = before + share * (targets.running_area[high] - before)
+    while low < high:
+        middle = (low + high) // 2
+        if targets.running_area[middle] < pick:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@wp.func
+def aim_at_box(aims: Aims, row: int, near: bool, drawn: Aim) -> Aim:
+    """End the sightline in the target box; if it is to be near the hint, with both ends pulled towards the hint's."""
+    out = drawn
+    state = drawn.state
+    share = wp.vec3d(f64(wp.randf(state)), f64(wp.randf(state)), f64(wp.randf(state)))
+    out.end = point_at(real(aims.target_lo[row]), real(aims.target_hi[row]), share)
+    if near:
+        reach = wp.pow(f64(2.0), NEAREST * f64(wp.randf(state)))
+        out.origin = pull(drawn.origin, aims.hint_origin[row], reach)
+        out.end = pull(out.end, aims.hint_end[row], reach)
+    out.state = state
+    return out
+
+
+@wp.func
+def aim_at_object(targets: AimTargets, aims: Aims, row: int, near: bool, boxed: int, attempt: int, drawn: Aim) -> Aim:
+    """End the sightline on the object; if it is to be near the hint, at the nearest of several points to its end."""
+    out = drawn
+    state = drawn.state
+    wanted = int(1)
+    if near:
+        wanted = NEAR_PICKS
+    best = f64(1.0e300)
+    point = wp.vec3d()
+    low = int(0)
+    picks = int(0)
+    while picks < PICKS:
+        picks += 1
+        low = pick_triangle(targets, aims.begin[row], aims.end[row], f64(wp.randf(state)))
+        s = wp.sqrt(f64(wp.randf(state)))
+        t = f64(wp.randf(state))
+        a = real(targets.a[low])
+        b = real(targets.b[low])
+        point = a * (f64(1.0) - s) + b * (s * (f64(1.0) - t)) + real(targets.c[low]) * (s * t)
+        if boxed == 0 or holds(aims.target_lo[row], aims.target_hi[row], point):
+            distance = wp.length_sq(point - aims.hint_end[row])
+            if distance < best:
+                best = distance
+                out.end = point
+                out.triangle = low
+            wanted -= 1
+            if wanted == 0:
+                picks = PICKS
+    if best == f64(1.0e300):
+        out.end = point
+        out.triangle = low
+    if near:
+        out.origin = pull(drawn.origin, aims.hint_origin[row], f64(1.0) / f64(1 + attempt))
+    out.state = state
+    return out
+
+
+@wp.func
+def recently_stopped(scene: Triangles, recent: wp.vec4i, origin: wp.vec3d, end: wp.vec3d) -> bool:
+    """Whether one of the triangles that stopped the last sightlines stops this one."""
+    for k in range(4):
+        item = recent[k]
+        if item >= 0:
+            if not clears(origin, end, real(scene.a[item]), real(scene.b[item]), real(scene.c[item])):
+                return True
+    return False
+
+
+@wp.func
+def surely_hits(targets: AimTargets, aim: Aim) -> bool:
+    """Whether the sightline, prolonged a little, surely hits the inside of the triangle that it was aimed at."""
+    beyond = aim.origin + (aim.end - aim.origin) * PROLONGED
+    k = aim.triangle
+    return hits(aim.origin, beyond, real(targets.a[k]), real(targets.b[k]), real(targets.c[k]))
+
+
 @wp.kernel
 def _aim(
     scene: Triangles,
-    a: wp.array(dtype=wp.vec3i),
-    b: wp.array(dtype=wp.vec3i),
-    c: wp.array(dtype=wp.vec3i),
-    running_area: wp.array(dtype=f64),
+    targets: AimTargets,
     aims: Aims,
-    first: int,
-    last: int,
-    slots: int,
     tries: int,
     boxed: int,
-    found_out: wp.array(dtype=wp.uint8),
-    origins_out: wp.array(dtype=wp.vec3d),
-    ends_out: wp.array(dtype=wp.vec3d),
+    first: int,
+    found_out: wp.array[wp.uint8],
+    origins_out: wp.array[wp.vec3d],
+    ends_out: wp.array[wp.vec3d],
 ):
     row = first + wp.tid()
-    while row < last:
-        state = wp.rand_init(aims.seed[row])
-        found_out[row] = wp.uint8(0)
-        owner = aims.owner[row]
-        near = aims.near[row]
-        attempt = int(0)
-        chosen = int(0)
-        recent = wp.vec4i(-1, -1, -1, -1)
-        newest = int(0)
-        while attempt < tries:
-            # Drawn here, not in a function: a function would advance a copy of the random state.
-            share = wp.vec3d(f64(wp.randf(state)), f64(wp.randf(state)), f64(wp.randf(state)))
-            origin = point_at(real(aims.source_lo[row]), real(aims.source_hi[row]), share)
-            end = wp.vec3d()
-            if owner < 0:
-                share = wp.vec3d(f64(wp.randf(state)), f64(wp.randf(state)), f64(wp.randf(state)))
-                end = point_at(real(aims.target_lo[row]), real(aims.target_hi[row]), share)
-                if near == 1 and attempt % 2 == 1:
-                    reach = wp.pow(f64(2.0), NEAREST * f64(wp.randf(state)))
-                    origin = pull(origin, aims.hint_origin[row], reach)
-                    end = pull(end, aims.hint_end[row], reach)
-            else:
-                # Odd attempts stay near the line that the axial model allows: of several points the nearest to its end.
-                wanted = int(1)
-                if near == 1 and attempt % 2 == 1:
-                    wanted = NEAR_PICKS
-                best = f64(1.0e300)
-                picks = int(0)
-                while picks < PICKS:
-                    picks += 1
-                    low = int(aims.begin[row])
-                    high = int(aims.end[row] - 1)
-                    before = f64(0.0)
-                    if low > 0:
-                        before = running_area[low - 1]
-                    pick = before + f64(wp.randf(state)) * (running_area[high] - before)
-                    while low < high:
-                        middle = (low + high) // 2
-                        if running_area[middle] < pick:
-                            low = middle + 1
-                        else:
-                            high = middle
-                    s = wp.sqrt(f64(wp.randf(state)))
-                    t = f64(wp.randf(state))
-                    point = real(a[low]) * (f64(1.0) - s) + real(b[low]) * (s * (f64(1.0) - t)) + real(c[low]) * (s * t)
-                    distance = wp.length_sq(point - aims.hint_end[row])
-                    if boxed == 0 or holds(aims.target_lo[row], aims.target_hi[row], point):
-                        if distance < best:
-                            best = distance
-                            end = point
-                            chosen = low
-                        wanted -= 1
-                        if wanted == 0:
-                            picks = PICKS
-                if best == f64(1.0e300):
-                    end = point
-                    chosen = low
-                if near == 1 and attempt % 2 == 1:
-                    origin = pull(origin, aims.hint_origin[row], f64(1.0) / f64(1 + attempt))
-            origin = quantised(origin)
-            end = quantised(end)
-            attempt += 1
-            # What stopped the last sightlines of this row mostly stops the next one.
-            stopped = bool(False)
-            for k in range(4):
-                if recent[k] >= 0 and not stopped:
-                    item = recent[k]
-                    stopped = not clears(origin, end, real(scene.a[item]), real(scene.b[item]), real(scene.c[item]))
-            if not stopped:
-                item = obstacle(scene, origin, end, owner)
-                if item < 0 and owner >= 0:
-                    # A point next to the object's edge: not sure to hit it when the sightline is prolonged a little.
-                    if not hits(
-                        origin, origin + (end - origin) * PROLONGED, real(a[chosen]), real(b[chosen]), real(c[chosen])
-                    ):
-                        continue
-                if item < 0:
-                    found_out[row] = wp.uint8(1)
-                    origins_out[row] = origin
-                    ends_out[row] = end
-                    attempt = tries
-                else:
-                    recent[newest] = item
-                    newest = (newest + 1) % 4
-        row += slots
+    found_out[row] = wp.uint8(0)
+    owner = aims.owner[row]
+    aim = Aim()
+    aim.state = wp.rand_init(aims.seed[row])
+    recent = wp.vec4i(-1, -1, -1, -1)
+    newest = int(0)
+    attempt = int(0)
+    while attempt < tries:
+        state = aim.state
+        share = wp.vec3d(f64(wp.randf(state)), f64(wp.randf(state)), f64(wp.randf(state)))
+        aim.state = state
+        aim.origin = point_at(real(aims.source_lo[row]), real(aims.source_hi[row]), share)
+        # Odd attempts stay near the line that the axial model allows.
+        near = aims.near[row] == 1 and attempt % 2 == 1
+        if owner < 0:
+            aim = aim_at_box(aims, row, near, aim)
+        else:
+            aim = aim_at_object(targets, aims, row, near, boxed, attempt, aim)
+        aim.origin = quantised(aim.origin)
+        aim.end = quantised(aim.end)
+        attempt += 1
+        # What stopped the last sightlines of this row mostly stops the next one.
+        if not recently_stopped(scene, recent, aim.origin, aim.end):
+            item = obstacle(scene, aim.origin, aim.end, owner)
+            if item >= 0:
+                recent[newest] = item
+                newest = (newest + 1) % 4
+            elif owner < 0 or surely_hits(targets, aim):
+                found_out[row] = wp.uint8(1)
+                origins_out[row] = aim.origin
+                ends_out[row] = aim.end
+                attempt = tries
 
 
 def launch_confirm(
-    scene: Triangles,
-    origins: np.ndarray,
-    ends: np.ndarray,
-    owners: np.ndarray,
-    *,
-    threads: int = 1,
-    device: str = "cpu",
+    scene: Triangles, origins: np.ndarray, ends: np.ndarray, owners: np.ndarray, *, device: Device = CPU
 ) -> np.ndarray:
     """Sightlines that certainly clear every opaque triangle.
 
@@ -339,8 +383,7 @@ def launch_confirm(
         origins: [grid steps], shape (n, 3), float64.
         ends: likewise.
         owners: object whose triangles are no obstacle (the target), or -1, shape (n,), int.
-        threads: CPU threads.
-        device: Warp device.
+        device: where to.
 
     Returns:
         Shape (n,), bool. True is never wrong; False may be clear by less than rounding.
@@ -348,39 +391,12 @@ def launch_confirm(
     Raises:
         InputError: a coordinate beyond the grid.
     """
-    count = len(origins)
     check_coordinates(origins)
     check_coordinates(ends)
-    starts = wp.array(np.ascontiguousarray(origins, np.float64), dtype=wp.vec3d, device=device)
-    stops = wp.array(np.ascontiguousarray(ends, np.float64), dtype=wp.vec3d, device=device)
-    owner = wp.array(np.ascontiguousarray(owners, np.int32), dtype=int, device=device)
-    clear = wp.zeros(count, dtype=wp.uint8, device=device)
-
-    def launch(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
-        wp.launch(_confirm, dim=slots, inputs=[scene, starts, stops, owner, first, last, slots, clear], device=device)
-
-    run_sliced(launch, count, SlotSizes(1, 1), module=__name__, threads=threads, device=device)
+    clear = device.zeros(len(origins), wp.uint8)
+    lines = [device.array(points, wp.vec3d) for points in (origins, ends)]
+    launch_rows(_confirm, len(origins), [scene, *lines, device.array(owners, int)], [clear], device)
     return clear.numpy().astype(bool)
-
-
-@dataclass
-class AimTargets:
-    """Triangles of all objects that may be aimed at, opaque or not, grouped by object, with their running area."""
-
-    a: wp.array
-    b: wp.array
-    c: wp.array
-    running_area: wp.array
-
-
-def aim_targets(triangles: np.ndarray, device: str = "cpu") -> AimTargets:
-    """Copy the triangles (m, 3, 3) of all objects, in object order, to a device."""
-    edges = (triangles[:, 1:] - triangles[:, :1]).astype(float)
-    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    return AimTargets(
-        *(vectors(triangles[:, i], device) for i in range(3)),
-        wp.array(np.cumsum(area), dtype=wp.float64, device=device),
-    )
 
 
 def launch_aim(
@@ -396,8 +412,7 @@ def launch_aim(
     *,
     tries: int,
     boxed: bool = False,
-    threads: int = 1,
-    device: str = "cpu",
+    device: Device = CPU,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Shoot from random points of each source box at its target until a sightline is clear.
 
@@ -411,11 +426,10 @@ def launch_aim(
         ranges: the object's first and past-the-last row in `targets`, shape (n, 2), int.
         seeds: of each row's random stream, shape (n,), int.
         near: rows whose every other sightline stays near the hint, shape (n,), bool.
-        tries: sightlines shot a row at most.
+        tries: sightlines shot per row at most.
         boxed: aim only at the part of the object inside the row's box (most of the time: a part that random points on
             the object rarely hit is given up, and the point is used as it is).
-        threads: CPU threads.
-        device: Warp device.
+        device: where to.
 
     Returns:
         Found, shape (n,), bool; origins and ends [grid steps], shape (n, 3), float64, defined where found.
@@ -424,45 +438,21 @@ def launch_aim(
         InputError: a coordinate of a box beyond the grid.
     """
     count = len(sources)
-    aims = Aims()
-    aims.source_lo, aims.source_hi = vectors(sources[:, 0], device), vectors(sources[:, 1], device)
-    aims.target_lo, aims.target_hi = vectors(boxes[:, 0], device), vectors(boxes[:, 1], device)
-    aims.hint_origin, aims.hint_end = (
-        wp.array(np.ascontiguousarray(hints[:, i], np.float64), dtype=wp.vec3d, device=device) for i in (0, 1)
+    aims = device.struct(
+        Aims,
+        source_lo=device.corners(sources[:, 0]),
+        source_hi=device.corners(sources[:, 1]),
+        target_lo=device.corners(boxes[:, 0]),
+        target_hi=device.corners(boxes[:, 1]),
+        hint_origin=hints[:, 0],
+        hint_end=hints[:, 1],
+        owner=owners,
+        begin=ranges[:, 0],
+        end=ranges[:, 1],
+        seed=seeds,
+        near=near,
     )
-    for name, values in (
-        ("owner", owners),
-        ("begin", ranges[:, 0]),
-        ("end", ranges[:, 1]),
-        ("seed", seeds),
-        ("near", near),
-    ):
-        setattr(aims, name, wp.array(np.ascontiguousarray(values, np.int32), dtype=int, device=device))
-    found = wp.zeros(count, dtype=wp.uint8, device=device)
-    origins, ends = (wp.zeros(count, dtype=wp.vec3d, device=device) for _ in range(2))
-
-    def launch(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
-        wp.launch(
-            _aim,
-            dim=slots,
-            inputs=[
-                scene,
-                targets.a,
-                targets.b,
-                targets.c,
-                targets.running_area,
-                aims,
-                first,
-                last,
-                slots,
-                tries,
-                int(boxed),
-                found,
-                origins,
-                ends,
-            ],
-            device=device,
-        )
-
-    run_sliced(launch, count, SlotSizes(1, 1), module=__name__, threads=threads, device=device)
+    found = device.zeros(count, wp.uint8)
+    origins, ends = device.zeros(count, wp.vec3d), device.zeros(count, wp.vec3d)
+    launch_rows(_aim, count, [scene, targets, aims, tries, int(boxed)], [found, origins, ends], device)
     return found.numpy().astype(bool), origins.numpy(), ends.numpy()

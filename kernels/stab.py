@@ -5,10 +5,9 @@ x_i = k at time w_i k - xi_i, so it meets a box iff `xi_i - xi_j >= w_i lo_i - w
 axes. Eliminating xi leaves five cycles, each a linear *cut* on w: a two-dimensional problem, solved here with a convex
 polygon of directions that every cut shrinks.
 
-All coordinates are integers below 2**24 and every decision is exact: a cut has integer coefficients below 2**26, a
-polygon vertex is the cross product of two cuts (below 2**53, so exact in float64), and the sign of a cut at a vertex is
-taken from 64-bit integers where float64 cannot tell. Trial directions are integers too, so "this line passes" is exact
-as well. HIDDEN is therefore never wrong, and the few directions too thin for an integer trial give UNKNOWN.
+All coordinates are integers below 2**24 and every decision is exact: cuts and polygons are those of
+kernels/directions.py, trial directions are integers, so "this line passes" is exact as well. HIDDEN is therefore never
+wrong, and the few directions too thin for an integer trial give UNKNOWN.
 
 Sources: Megiddo 1996 (US 5,481,658) and Goodman et al. 2006, "Cremona convexity, frame convexity, and a theorem of
 Santalo" for the convexity; Funkhouser et al. 1996, section 3.2 for its use.
@@ -16,34 +15,35 @@ Santalo" for the convexity; Funkhouser et al. 1996, section 3.2 for its use.
 
 import warp as wp
 
-# Ordered pairs of axes, two lists a pair: list 2u holds (a, b) = (lo_i, hi_j), list 2u + 1 holds (lo_j, hi_i).
+from ..data.verdict import Verdict
+from .directions import POLYGON_SIZE, clip, copy_polygon, middle, to_integers
+
+# Ordered pairs of axes, two lists per pair: list 2u holds (a, b) = (lo_i, hi_j), list 2u + 1 holds (lo_j, hi_i).
 # Unordered pair u: 0 = (x, y), 1 = (y, z), 2 = (x, z).
 # Entries a list can hold: a portal sequence longer than this is answered UNKNOWN.
 LIST_CAPACITY = wp.constant(96)
-LISTS_SIZE = wp.constant(6 * 96 * 2)
-# A polygon: its edge count, then (x, y, z, tag) of each edge's cut.
-EDGE_CAPACITY = wp.constant(24)
-POLYGON_SIZE = wp.constant(1 + 4 * 24)
+LISTS_SIZE = wp.constant(6 * LIST_CAPACITY * 2)
 # A level: slope bounds (low numerator, denominator, tag, high numerator, denominator, tag) of three pairs, direction w,
 # the maxima M of the six lists at w, and the polygon.
 SLOPES_SIZE = wp.constant(18)
 AT_W = wp.constant(18)
 AT_M = wp.constant(21)
 AT_POLYGON = wp.constant(27)
-LEVEL_SIZE = wp.constant(27 + 1 + 4 * 24)
-
-HIDDEN = wp.constant(0)
-STABBED = wp.constant(1)
-UNDECIDED = wp.constant(2)
-
-# A trial direction has integer components up to this, so that w * coordinate and sums of six of them stay exact.
-W_SCALE = wp.constant(wp.float64(2.0**24))
+LEVEL_SIZE = wp.constant(AT_POLYGON + POLYGON_SIZE)
+# Two spare polygons, and the cut that left nothing with the place of the polygon that it emptied.
+FAILING_SIZE = wp.constant(8)
+SPARES_SIZE = wp.constant(2 * POLYGON_SIZE + FAILING_SIZE)
 MAX_TRIALS = wp.constant(48)
 TAG_BASE = wp.constant(128)
 
 f64 = wp.float64
 vec6i = wp.types.vector(length=6, dtype=wp.int32)
 vec6d = wp.types.vector(length=6, dtype=wp.float64)
+
+
+def slot_size(levels: int) -> int:
+    """Float64 values of scratch that a search through so many levels needs: levels, then lists, then spares."""
+    return levels * LEVEL_SIZE + LISTS_SIZE + SPARES_SIZE
 
 
 @wp.func
@@ -79,7 +79,7 @@ def list_to(p: int) -> int:
 
 
 @wp.func
-def append_entry(work: wp.array(dtype=f64), lists: int, p: int, k: int, a: f64, b: f64):
+def append_entry(work: wp.array[f64], lists: int, p: int, k: int, a: f64, b: f64):
     """Store row k of list p."""
     at = lists + (p * LIST_CAPACITY + k) * 2
     work[at] = a
@@ -87,7 +87,7 @@ def append_entry(work: wp.array(dtype=f64), lists: int, p: int, k: int, a: f64, 
 
 
 @wp.func
-def append_box(work: wp.array(dtype=f64), lists: int, counts: vec6i, lo: wp.vec3d, hi: wp.vec3d, flat: int) -> vec6i:
+def append_box(work: wp.array[f64], lists: int, counts: vec6i, lo: wp.vec3d, hi: wp.vec3d, flat: int) -> vec6i:
     """Append the rows of one box; a box flat on axis `flat` needs only the four that name that axis (-1: all six)."""
     out = counts
     for p in range(6):
@@ -100,7 +100,7 @@ def append_box(work: wp.array(dtype=f64), lists: int, counts: vec6i, lo: wp.vec3
 
 
 @wp.func
-def start_level(work: wp.array(dtype=f64), level: int):
+def start_level(work: wp.array[f64], level: int):
     """The widest level: slopes in (0, infinity), the whole triangle of directions."""
     for u in range(3):
         at = level + 6 * u
@@ -117,145 +117,6 @@ def start_level(work: wp.array(dtype=f64), level: int):
             work[polygon + 1 + 4 * i + c] = f64(0.0)
         work[polygon + 1 + 4 * i + i] = f64(-1.0)
         work[polygon + 1 + 4 * i + 3] = f64(-1.0)
-
-
-@wp.func
-def det_sign(g: wp.vec3d, v: wp.vec3d) -> int:
-    """Exact sign of g . v for integers |g| <= 2**26, |v| <= 2**53 held in float64."""
-    t0 = g[0] * v[0]
-    t1 = g[1] * v[1]
-    t2 = g[2] * v[2]
-    det = t0 + t1 + t2
-    # Three products and two sums, each rounded once: the error is below 4 * 2**-53 of the magnitudes; 2**-50 is safe.
-    bound = (wp.abs(t0) + wp.abs(t1) + wp.abs(t2)) * f64(8.881784197001252e-16)
-    if det > bound:
-        return 1
-    if det < -bound:
-        return -1
-    high = wp.int64(0)
-    low = wp.int64(0)
-    for i in range(3):
-        whole = wp.int64(v[i])
-        upper = whole >> wp.int64(27)
-        high += wp.int64(g[i]) * upper
-        low += wp.int64(g[i]) * (whole - (upper << wp.int64(27)))
-    high += low >> wp.int64(27)
-    low = low & wp.int64(134217727)
-    if high > wp.int64(0):
-        return 1
-    if high < wp.int64(0):
-        return -1
-    if low > wp.int64(0):
-        return 1
-    return 0
-
-
-@wp.func
-def edge_cut(work: wp.array(dtype=f64), polygon: int, k: int) -> wp.vec3d:
-    """Cut of edge k of a polygon."""
-    at = polygon + 1 + 4 * k
-    return wp.vec3d(work[at], work[at + 1], work[at + 2])
-
-
-@wp.func
-def clip(work: wp.array(dtype=f64), source: int, target: int, g: wp.vec3d, tag: f64) -> int:
-    """Clip polygon `source` by g . w <= 0 into `target`.
-
-    Returns:
-        0 if nothing with g . w < 0 is left, 1 if the cut removed something, 2 if it removed nothing (target untouched),
-        3 if the polygon has no room for another edge (target untouched).
-    """
-    n = int(work[source])
-    removed = int(0)
-    positive = int(0)
-    negative = int(0)
-    e = edge_cut(work, source, 0)
-    for k in range(n):
-        following = int(k + 1)
-        if following == n:
-            following = 0
-        e_next = edge_cut(work, source, following)
-        s = det_sign(g, wp.cross(e, e_next))
-        if s >= 0:
-            removed = removed | (1 << k)
-        if s > 0:
-            positive += 1
-        if s < 0:
-            negative += 1
-        e = e_next
-    if negative == 0:
-        return 0
-    if positive == 0:
-        return 2
-    # Vertex k lies between edges k and k + 1. The run of removed vertices starts at `first` and ends before `kept`.
-    first = int(0)
-    for k in range(n):
-        before = int(k - 1)
-        if before < 0:
-            before = n - 1
-        if ((removed >> k) & 1) == 1 and ((removed >> before) & 1) == 0:
-            first = k
-    kept = int(first)
-    while ((removed >> kept) & 1) == 1:
-        kept += 1
-        if kept == n:
-            kept = 0
-    # Edges kept .. first survive (vertices kept .. first - 1), then the new one closes the ring.
-    count = int(first - kept + 1)
-    if count <= 0:
-        count += n
-    if count + 1 > EDGE_CAPACITY:
-        return 3
-    k = int(kept)
-    for m in range(count):
-        for c in range(4):
-            work[target + 1 + 4 * m + c] = work[source + 1 + 4 * k + c]
-        k += 1
-        if k == n:
-            k = 0
-    at = target + 1 + 4 * count
-    work[at] = g[0]
-    work[at + 1] = g[1]
-    work[at + 2] = g[2]
-    work[at + 3] = tag
-    work[target] = f64(count + 1)
-    return 1
-
-
-@wp.func
-def copy_polygon(work: wp.array(dtype=f64), source: int, target: int):
-    """Copy the used part of a polygon."""
-    n = int(work[source])
-    for k in range(1 + 4 * n):
-        work[target + k] = work[source + k]
-
-
-@wp.func
-def middle(work: wp.array(dtype=f64), polygon: int) -> wp.vec3d:
-    """A direction inside the polygon: the mean of its vertices, scaled to sum 1 each."""
-    n = int(work[polygon])
-    total = wp.vec3d(f64(0.0), f64(0.0), f64(0.0))
-    e = edge_cut(work, polygon, 0)
-    for k in range(n):
-        following = int(k + 1)
-        if following == n:
-            following = 0
-        e_next = edge_cut(work, polygon, following)
-        v = wp.cross(e, e_next)
-        total += v / (v[0] + v[1] + v[2])
-        e = e_next
-    return total
-
-
-@wp.func
-def to_integers(w: wp.vec3d) -> wp.vec3d:
-    """The direction rounded to integers from 1 to W_SCALE."""
-    scale = W_SCALE / wp.max(w[0], wp.max(w[1], w[2]))
-    return wp.vec3d(
-        wp.max(f64(1.0), wp.floor(w[0] * scale)),
-        wp.max(f64(1.0), wp.floor(w[1] * scale)),
-        wp.max(f64(1.0), wp.floor(w[2] * scale)),
-    )
 
 
 @wp.func
@@ -278,7 +139,7 @@ def raise_maxima(m: vec6d, w: wp.vec3d, lo: wp.vec3d, hi: wp.vec3d, flat: int) -
 
 
 @wp.func
-def narrow_slopes(work: wp.array(dtype=f64), lists: int, level: int, before: vec6i, counts: vec6i) -> int:
+def narrow_slopes(work: wp.array[f64], lists: int, level: int, before: vec6i, counts: vec6i) -> int:
     """Tighten the slope bounds of a level by every two-cycle that a row at or past `before` takes part in.
 
     Returns:
@@ -324,7 +185,7 @@ def narrow_slopes(work: wp.array(dtype=f64), lists: int, level: int, before: vec
                     work[at + 3] = f64(-1.0)
                     work[at + 4] = f64(0.0)
                     work[at + 5] = ht
-                    return HIDDEN
+                    return Verdict.HIDDEN
                 m += 1
         work[at] = ln
         work[at + 1] = ld
@@ -333,12 +194,12 @@ def narrow_slopes(work: wp.array(dtype=f64), lists: int, level: int, before: vec
         work[at + 4] = hd
         work[at + 5] = ht
         if hn * ld <= ln * hd:
-            return HIDDEN
+            return Verdict.HIDDEN
     return 4 * moved + 1
 
 
 @wp.func
-def maxima(work: wp.array(dtype=f64), lists: int, counts: vec6i, w: wp.vec3d) -> tuple[vec6d, vec6i, f64]:
+def maxima(work: wp.array[f64], lists: int, counts: vec6i, w: wp.vec3d) -> tuple[vec6d, vec6i, f64]:
     """M of the six lists at w, the rows that attain it, and the largest magnitude that entered."""
     m = vec6d()
     arg = vec6i()
@@ -363,7 +224,7 @@ def maxima(work: wp.array(dtype=f64), lists: int, counts: vec6i, w: wp.vec3d) ->
 
 
 @wp.func
-def cycle_cut(work: wp.array(dtype=f64), lists: int, m: vec6d, arg: vec6i) -> wp.vec4d:
+def cycle_cut(work: wp.array[f64], lists: int, m: vec6d, arg: vec6i) -> wp.vec4d:
     """The worst cycle at the trial direction as a cut (x, y, z) with its tag."""
     best = m[0] + m[1]
     cycle = int(0)
@@ -406,7 +267,7 @@ def cycle_cut(work: wp.array(dtype=f64), lists: int, m: vec6d, arg: vec6i) -> wp
 
 
 @wp.func
-def slope_cut(work: wp.array(dtype=f64), level: int, bound: int) -> wp.vec4d:
+def slope_cut(work: wp.array[f64], level: int, bound: int) -> wp.vec4d:
     """Slope bound 2u (low) or 2u + 1 (high) of a level as a cut (x, y, z) with its tag."""
     u = bound // 2
     at = level + 6 * u + 3 * (bound % 2)
@@ -421,7 +282,7 @@ def slope_cut(work: wp.array(dtype=f64), level: int, bound: int) -> wp.vec4d:
 
 
 @wp.func
-def clip_spare(work: wp.array(dtype=f64), current: int, spare_a: int, spare_b: int, g: wp.vec4d) -> tuple[int, int]:
+def clip_spare(work: wp.array[f64], current: int, spare_a: int, spare_b: int, g: wp.vec4d) -> tuple[int, int]:
     """Clip the current polygon into whichever spare is free; returns (clip's answer, where the polygon is now)."""
     target = spare_a
     if current == spare_a:
@@ -433,7 +294,7 @@ def clip_spare(work: wp.array(dtype=f64), current: int, spare_a: int, spare_b: i
 
 
 @wp.func
-def report_failing(work: wp.array(dtype=f64), failing: int, g: wp.vec4d, polygon: int):
+def report_failing(work: wp.array[f64], failing: int, g: wp.vec4d, polygon: int):
     """Store the cut that left nothing and where the polygon is that it emptied."""
     for c in range(4):
         work[failing + c] = g[c]
@@ -442,7 +303,7 @@ def report_failing(work: wp.array(dtype=f64), failing: int, g: wp.vec4d, polygon
 
 @wp.func
 def decide(
-    work: wp.array(dtype=f64), lists: int, inherited: int, level: int, spare: int, before: vec6i, counts: vec6i
+    work: wp.array[f64], lists: int, inherited: int, level: int, spare: int, before: vec6i, counts: vec6i
 ) -> int:
     """Decide the rows of the lists, given the level `inherited` that was decided with the rows up to `before`.
 
@@ -450,16 +311,16 @@ def decide(
     `spare` ends with the cut that emptied it (see `launch_stab`).
 
     Returns:
-        HIDDEN: exact, no open set of lines. STABBED: exact, w and M are a witness. UNDECIDED: neither could be shown.
+        HIDDEN: exact, no open set of lines. VISIBLE: exact, w and M are a witness. UNKNOWN: neither could be shown.
     """
     for k in range(SLOPES_SIZE):
         work[level + k] = work[inherited + k]
     moved = narrow_slopes(work, lists, level, before, counts)
     # The failing cut is reported at `spare + 2 * POLYGON_SIZE`; slopes that failed are flagged by tag -2.
     failing = spare + 2 * POLYGON_SIZE
-    if moved == HIDDEN:
+    if moved == Verdict.HIDDEN:
         work[failing + 3] = f64(-2.0)
-        return HIDDEN
+        return Verdict.HIDDEN
     moved = moved // 4
     current = inherited + AT_POLYGON
     spare_b = spare + POLYGON_SIZE
@@ -469,9 +330,9 @@ def decide(
             answer, at = clip_spare(work, current, spare, spare_b, g)
             if answer == 0:
                 report_failing(work, failing, g, current)
-                return HIDDEN
+                return Verdict.HIDDEN
             current = at
-    verdict = UNDECIDED
+    verdict = int(Verdict.UNKNOWN)
     m = vec6d()
     w = wp.vec3d()
     trial = int(0)
@@ -481,21 +342,21 @@ def decide(
         w = to_integers(real)
         m, arg, magnitude = maxima(work, lists, counts, w)
         if worst_cycle(m) < f64(0.0):
-            verdict = STABBED
+            verdict = int(Verdict.VISIBLE)
             trial = MAX_TRIALS
         else:
             g = cycle_cut(work, lists, m, arg)
             answer, at = clip_spare(work, current, spare, spare_b, g)
             if answer == 0:
                 report_failing(work, failing, g, current)
-                return HIDDEN
+                return Verdict.HIDDEN
             if answer >= 2:
                 # Too thin for integers: the unrounded direction, with a bound on what rounding can do to a cycle sum
                 # (at most 3 rows; products, difference and sums each round once: 4 * 2**-53 a row, doubled).
                 m, arg, magnitude = maxima(work, lists, counts, real)
                 if worst_cycle(m) < f64(-2.6645352591003757e-15) * magnitude:
                     w = real
-                    verdict = STABBED
+                    verdict = int(Verdict.VISIBLE)
                 trial = MAX_TRIALS
             current = at
     for c in range(3):
@@ -518,3 +379,34 @@ def offsets(m: vec6d) -> wp.vec3d:
     y_low = wp.max(m[2], x + m[1])
     y_high = wp.min(-m[3], x - m[0])
     return wp.vec3d(x, f64(0.5) * (y_low + y_high), f64(0.0))
+
+
+@wp.func
+def direction(work: wp.array[f64], level: int) -> wp.vec3d:
+    """Direction w of a decided level."""
+    return wp.vec3d(work[level + AT_W], work[level + AT_W + 1], work[level + AT_W + 2])
+
+
+@wp.func
+def level_maxima(work: wp.array[f64], level: int) -> vec6d:
+    """Maxima M of a decided level at its direction."""
+    m = vec6d()
+    for p in range(6):
+        m[p] = work[level + AT_M + p]
+    return m
+
+
+@wp.func
+def store_counts(frames: wp.array[int], at: int, counts: vec6i):
+    """Save row counts."""
+    for p in range(6):
+        frames[at + p] = counts[p]
+
+
+@wp.func
+def load_counts(frames: wp.array[int], at: int) -> vec6i:
+    """Saved row counts."""
+    counts = vec6i()
+    for p in range(6):
+        counts[p] = frames[at + p]
+    return counts

@@ -11,22 +11,21 @@ import warp as wp
 
 from ..data.errors import InputError
 from ..data.scene import GRID_LIMIT
+from ..data.verdict import Verdict
+from .directions import EDGE_CAPACITY, POLYGON_SIZE
 from .graph import reflect_high, reflect_low
-from .launch import SlotSizes, run_sliced
+from .launch import CPU, Device, Scratch, launch_slots
 from .stab import (
-    AT_M,
-    AT_W,
-    HIDDEN,
     LEVEL_SIZE,
     LIST_CAPACITY,
     LISTS_SIZE,
-    POLYGON_SIZE,
-    STABBED,
     append_box,
     decide,
+    direction,
+    level_maxima,
     offsets,
+    slot_size,
     start_level,
-    vec6d,
     vec6i,
 )
 
@@ -34,34 +33,33 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 f64 = wp.float64
 
-# Two levels, the rows, two spare polygons and the failing cut.
-SLOT_SIZE = wp.constant(2 * (27 + 1 + 4 * 24) + 6 * 96 * 2 + 2 * (1 + 4 * 24) + 8)
+SLOT_SIZE = wp.constant(slot_size(2))
 # Every edge of the last polygon, and the cut that emptied it.
-CUT_CAPACITY = wp.constant(24 + 1)
+CUT_CAPACITY = wp.constant(EDGE_CAPACITY + 1)
 
 
 @wp.struct
 class BoxLists:
     """Box lists, padded to one length, and the octant of each; bit i is set when direction component i is negative."""
 
-    lo: wp.array2d(dtype=wp.vec3i)
-    hi: wp.array2d(dtype=wp.vec3i)
-    lengths: wp.array(dtype=int)
-    octants: wp.array(dtype=int)
+    lo: wp.array2d[wp.vec3i]
+    hi: wp.array2d[wp.vec3i]
+    lengths: wp.array[int]
+    octants: wp.array[int]
 
 
 @wp.struct
 class Decisions:
     """Columns of `StabAnswers`."""
 
-    verdict: wp.array(dtype=wp.uint8)
-    w: wp.array(dtype=wp.vec3d)
-    xi: wp.array(dtype=wp.vec3d)
-    cuts: wp.array2d(dtype=int)
+    verdict: wp.array[wp.uint8]
+    w: wp.array[wp.vec3d]
+    xi: wp.array[wp.vec3d]
+    cuts: wp.array2d[int]
 
 
 @wp.func
-def report_slopes(work: wp.array(dtype=f64), level: int, cuts_out: wp.array2d(dtype=int), row: int):
+def report_slopes(work: wp.array[f64], level: int, cuts_out: wp.array2d[int], row: int):
     """Tags of the one or two slope bounds that leave no direction."""
     found = bool(False)
     for u in range(3):
@@ -76,7 +74,7 @@ def report_slopes(work: wp.array(dtype=f64), level: int, cuts_out: wp.array2d(dt
 
 
 @wp.func
-def report_polygon(work: wp.array(dtype=f64), failing: int, cuts_out: wp.array2d(dtype=int), row: int):
+def report_polygon(work: wp.array[f64], failing: int, cuts_out: wp.array2d[int], row: int):
     """Tags of the last polygon's edges, then that of the cut that emptied it."""
     polygon = int(work[failing + 4])
     count = int(0)
@@ -93,8 +91,9 @@ def _stab(
     lists_in: BoxLists,
     first: int,
     last: int,
-    work: wp.array(dtype=f64),
-    answers: Decisions,
+    slots: int,
+    work: wp.array[f64],
+    answers_out: Decisions,
 ):
     slot = wp.tid()
     root = slot * SLOT_SIZE
@@ -102,7 +101,6 @@ def _stab(
     lists = root + 2 * LEVEL_SIZE
     spare = lists + LISTS_SIZE
     failing = spare + 2 * POLYGON_SIZE
-    slots = work.shape[0] // SLOT_SIZE
     row = first + slot
     while row < last:
         octant = lists_in.octants[row]
@@ -113,18 +111,15 @@ def _stab(
             counts = append_box(work, lists, counts, lo, hi, -1)
         start_level(work, root)
         verdict = decide(work, lists, root, level, spare, vec6i(), counts)
-        answers.verdict[row] = wp.uint8(verdict)
-        if verdict == HIDDEN:
+        answers_out.verdict[row] = wp.uint8(verdict)
+        if verdict == Verdict.HIDDEN:
             if work[failing + 3] == f64(-2.0):
-                report_slopes(work, level, answers.cuts, row)
+                report_slopes(work, level, answers_out.cuts, row)
             else:
-                report_polygon(work, failing, answers.cuts, row)
-        elif verdict == STABBED:
-            m = vec6d()
-            for p in range(6):
-                m[p] = work[level + AT_M + p]
-            answers.w[row] = wp.vec3d(work[level + AT_W], work[level + AT_W + 1], work[level + AT_W + 2])
-            answers.xi[row] = offsets(m)
+                report_polygon(work, failing, answers_out.cuts, row)
+        elif verdict == Verdict.VISIBLE:
+            answers_out.w[row] = direction(work, level)
+            answers_out.xi[row] = offsets(level_maxima(work, level))
         row += slots
 
 
@@ -133,9 +128,9 @@ class StabAnswers:
     """Answers of a batch, one row a box list.
 
     Attributes:
-        verdict: 0 hidden, 1 stabbed, 2 undecided; uint8. Hidden and stabbed are exact, for lines through the insides.
+        verdict: `Verdict`, uint8: HIDDEN and VISIBLE are exact, for lines through the insides.
         signs: direction octant as asked, shape (n, 3), int32.
-        w: of a stabbed row's line, float64, shape (n, 3): component i of the direction is sign_i / w_i.
+        w: of a visible row's line, float64, shape (n, 3): component i of the direction is sign_i / w_i.
         xi: coordinate i of the line at time t is sign_i (t + xi_i) / w_i, float64, shape (n, 3).
         cuts: tags of a hidden row's cuts, -1 where there is no more, shape (n, 25), int32; the last one completes the
             proof, together with at most two others (see `verify.proofs.stab_cuts`).
@@ -148,7 +143,7 @@ class StabAnswers:
     cuts: np.ndarray
 
     def line(self, row: int) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
-        """Point [grid steps] and direction of a stabbed row's witness line, exactly."""
+        """Point [grid steps] and direction of a visible row's witness line, exactly."""
         w, xi = ([Fraction(float(c)) for c in column[row]] for column in (self.w, self.xi))
         signs = self.signs[row].tolist()
         point = tuple(s * x / c for s, x, c in zip(signs, xi, w, strict=True))
@@ -160,8 +155,7 @@ def launch_stab(
     signs: np.ndarray,
     lengths: np.ndarray | None = None,
     *,
-    threads: int = 1,
-    device: str = "cpu",
+    device: Device = CPU,
 ) -> StabAnswers:
     """Whether a line of each octant passes through the inside of all boxes of each list.
 
@@ -170,11 +164,10 @@ def launch_stab(
             is a portal.
         signs: direction octants, +1 and -1, shape (n, 3).
         lengths: boxes used of each list, 1 to k, shape (n,); all k by default. At most 96.
-        threads: CPU threads; ignored on a GPU.
-        device: Warp device.
+        device: where to.
 
     Returns:
-        Answers. Hidden and stabbed are never wrong; undecided is neither.
+        Answers. HIDDEN and VISIBLE are never wrong; UNKNOWN is neither.
 
     Raises:
         InputError: shapes, coordinates, signs or lengths out of range.
@@ -183,23 +176,13 @@ def launch_stab(
     lengths = np.full(boxes.shape[:1], boxes.shape[1]) if lengths is None else np.asarray(lengths)
     _check(boxes, signs, lengths)
     count = len(boxes)
-    work = BoxLists()
     # Warp has no array with an axis of length 0.
-    padded = boxes if count else np.zeros((1, 1, 2, 3))
-    corners = np.ascontiguousarray(padded.transpose(2, 0, 1, 3), np.int32)
-    work.lo, work.hi = (wp.array(corners[side], dtype=wp.vec3i, device=device) for side in (0, 1))
-    work.lengths = wp.array(lengths.astype(np.int32), dtype=int, device=device)
-    octants = ((signs < 0) << np.arange(3)).sum(axis=1).astype(np.int32)
-    work.octants = wp.array(octants, dtype=int, device=device)
-    answers = Decisions()
-    answers.verdict = wp.zeros(count, dtype=wp.uint8, device=device)
-    answers.w, answers.xi = (wp.zeros(count, dtype=wp.vec3d, device=device) for _ in range(2))
-    answers.cuts = wp.full((count, int(CUT_CAPACITY)), -1, dtype=int, device=device)
-
-    def launch(first: int, last: int, slots: int, scratch: wp.array, _integers: wp.array) -> None:
-        wp.launch(_stab, dim=slots, inputs=[work, first, last, scratch, answers], device=device)
-
-    run_sliced(launch, count, SlotSizes(int(SLOT_SIZE), 0), module=__name__, threads=threads, device=device)
+    padded = boxes if count else np.zeros((1, 1, 2, 3), int)
+    octants = ((signs < 0) << np.arange(3)).sum(axis=1)
+    work = device.struct(BoxLists, lo=padded[:, :, 0], hi=padded[:, :, 1], lengths=lengths, octants=octants)
+    cuts = np.full((count, int(CUT_CAPACITY)), -1)
+    answers = device.struct(Decisions, verdict=count, w=count, xi=count, cuts=cuts)
+    launch_slots(_stab, count, [work], Scratch(int(SLOT_SIZE)), [answers], device)
     columns = (answers.verdict, answers.w, answers.xi, answers.cuts)
     verdict, w, xi, cuts = (column.numpy() for column in columns)
     return StabAnswers(verdict, signs.astype(np.int32), w, xi, cuts)

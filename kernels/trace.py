@@ -1,10 +1,11 @@
-"""Walk sightlines through the cell-and-portal graph: the cells entered and the portals crossed, in order."""
+"""Trace sightlines through the cell-and-portal graph: the cells entered and the portals crossed, in order."""
 
 import numpy as np
 import warp as wp
 
+from ..data.ragged import starts_of
 from .graph import DeviceGraph
-from .launch import SlotSizes, run_sliced
+from .launch import CPU, Device, launch_rows
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -36,63 +37,58 @@ def crossing_portal(graph: DeviceGraph, cell: int, axis: int, forward: bool, poi
 
 
 @wp.kernel
-def _walk(
+def _trace(
     graph: DeviceGraph,
-    sources: wp.array(dtype=int),
-    origins: wp.array(dtype=wp.vec3d),
-    ends: wp.array(dtype=wp.vec3d),
-    spots: wp.array(dtype=wp.int64),
+    sources: wp.array[int],
+    origins: wp.array[wp.vec3d],
+    ends: wp.array[wp.vec3d],
+    spots: wp.array[wp.int64],
     first: int,
-    last: int,
-    slots: int,
-    steps_out: wp.array(dtype=int),
-    reached_out: wp.array(dtype=int),
-    portals_out: wp.array(dtype=int),
+    steps_out: wp.array[int],
+    reached_out: wp.array[int],
+    portals_out: wp.array[int],
 ):
     row = first + wp.tid()
-    while row < last:
-        cell = int(sources[row])
-        p = origins[row]
-        d = ends[row] - p
-        steps = int(0)
-        walking = bool(True)
-        while walking:
-            leave = f64(1.0)
-            axis = int(-1)
-            for i in range(3):
-                t = f64(2.0)
-                if d[i] > f64(0.0):
-                    t = (f64(graph.cell_hi[cell][i]) - p[i]) / d[i]
-                if d[i] < f64(0.0):
-                    t = (f64(graph.cell_lo[cell][i]) - p[i]) / d[i]
-                if t < leave:
-                    leave = t
-                    axis = i
-            if axis < 0:
+    cell = int(sources[row])
+    p = origins[row]
+    d = ends[row] - p
+    steps = int(0)
+    walking = bool(True)
+    while walking:
+        leave = f64(1.0)
+        axis = int(-1)
+        for i in range(3):
+            t = f64(2.0)
+            if d[i] > f64(0.0):
+                t = (f64(graph.cell_hi[cell][i]) - p[i]) / d[i]
+            if d[i] < f64(0.0):
+                t = (f64(graph.cell_lo[cell][i]) - p[i]) / d[i]
+            if t < leave:
+                leave = t
+                axis = i
+        if axis < 0:
+            walking = False
+        else:
+            step = crossing_portal(graph, cell, axis, d[axis] > f64(0.0), p + d * leave)
+            cell = step[1]
+            if step[0] >= 0 and portals_out.shape[0] > 0:
+                portals_out[spots[row] + wp.int64(steps)] = step[0]
+            steps += 1
+            if cell < 0 or steps == MAX_STEPS:
+                cell = -1
                 walking = False
-            else:
-                step = crossing_portal(graph, cell, axis, d[axis] > f64(0.0), p + d * leave)
-                cell = step[1]
-                if step[0] >= 0 and portals_out.shape[0] > 0:
-                    portals_out[spots[row] + wp.int64(steps)] = step[0]
-                steps += 1
-                if cell < 0 or steps == MAX_STEPS:
-                    cell = -1
-                    walking = False
-        steps_out[row] = steps
-        reached_out[row] = cell
-        row += slots
+    steps_out[row] = steps
+    reached_out[row] = cell
 
 
-def launch_walk(
+def launch_trace(
     graph: DeviceGraph,
     sources: np.ndarray,
     origins: np.ndarray,
     ends: np.ndarray,
     *,
     record: bool = True,
-    threads: int = 1,
-    device: str = "cpu",
+    device: Device = CPU,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Portals that each segment crosses on its way.
 
@@ -102,31 +98,24 @@ def launch_walk(
         origins: [grid steps], shape (n, 3), float64.
         ends: likewise.
         record: list the portals; without it only the cells are wanted, in half the time.
-        threads: CPU threads.
-        device: Warp device.
+        device: that holds the graph.
 
     Returns:
         The cell that holds each end, -1 where the walk met a wall or a portal's edge; starts, shape (n + 1,), int64;
         and the portals of row r at starts[r]:starts[r + 1], int32 (undefined where the walk failed).
     """
     count = len(sources)
-    source = wp.array(np.ascontiguousarray(sources, np.int32), dtype=int, device=device)
-    p, q = (wp.array(np.ascontiguousarray(x, np.float64), dtype=wp.vec3d, device=device) for x in (origins, ends))
-    steps, reached = (wp.zeros(count, dtype=int, device=device) for _ in range(2))
+    rays = [device.array(sources, int), *(device.array(x, wp.vec3d) for x in (origins, ends))]
+    steps, reached = device.zeros(count, int), device.zeros(count, int)
 
     def run(spots: np.ndarray, total: int) -> wp.array:
-        places = wp.array(spots, dtype=wp.int64, device=device)
-        portals = wp.zeros(total, dtype=int, device=device)
-
-        def launch(first: int, last: int, slots: int, _values: wp.array, _integers: wp.array) -> None:
-            inputs = [graph, source, p, q, places, first, last, slots, steps, reached, portals]
-            wp.launch(_walk, dim=slots, inputs=inputs, device=device)
-
-        run_sliced(launch, count, SlotSizes(1, 1), module=__name__, threads=threads, device=device)
+        portals = device.zeros(total, int)
+        inputs = [graph, *rays, device.array(spots, wp.int64)]
+        launch_rows(_trace, count, inputs, [steps, reached, portals], device)
         return portals
 
     run(np.zeros(count, np.int64), 0)
-    starts = np.concatenate([[0], np.cumsum(steps.numpy(), dtype=np.int64)])
+    starts = starts_of(steps.numpy())
     if not record:
         return reached.numpy(), starts, np.zeros(0, np.int32)
     portals = run(starts[:-1], int(starts[-1]))

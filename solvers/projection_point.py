@@ -28,7 +28,8 @@ from itertools import combinations
 import numpy as np
 
 from ..data.errors import InputError
-from ..kernels.shadow import LEAST_HEIGHT, USABLE, Umbras, launch_shrink
+from ..kernels.shrink import LEAST_HEIGHT, launch_shrink
+from ..kernels.umbra import USABLE, Umbras
 from .result import Result, Status
 
 # Limits of the interior point method, in units of the cell's diagonal and of the largest coefficient.

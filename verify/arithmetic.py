@@ -1,12 +1,15 @@
-"""Exact predicates on one segment, point and triangle, in Python integers: the referee of last resort."""
+"""Vectors of integers or fractions, exactly: the algebra that twins and checkers of proofs share.
+
+Nothing here decides anything about visibility, so sharing it joins no twin with what it checks.
+"""
 
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 
-MISS, GRAZE, BLOCKED = 0, 1, 2
-Vector = Sequence[int]
+Vector = Sequence[int | Fraction]
 
 
 def as_integers(*points: np.ndarray) -> tuple[list[list[int]], int]:
@@ -16,92 +19,54 @@ def as_integers(*points: np.ndarray) -> tuple[list[list[int]], int]:
     return [[top * (scale // bottom) for top, bottom in point] for point in ratios], scale
 
 
-def minus(a: Vector, b: Vector) -> list[int]:
+def fractions(point: Sequence[float]) -> list[Fraction]:
+    """The coordinates as fractions; floats are taken at their exact value."""
+    # A Fraction of NumPy's integers would keep them, and overflow.
+    return [Fraction(c) for c in (point.tolist() if isinstance(point, np.ndarray) else point)]
+
+
+def rational(points: Sequence[Sequence[float]]) -> list[list[Fraction]]:
+    """`fractions` of each point."""
+    return [fractions(point) for point in points]
+
+
+def box_corners(box: Sequence[Vector]) -> list[list[Fraction]]:
+    """The eight corners of (low, high)."""
+    return [[Fraction(box[side][i]) for i, side in enumerate(pick)] for pick in product((0, 1), repeat=3)]
+
+
+def minus(a: Vector, b: Vector) -> list[int | Fraction]:
     """Difference a - b."""
     return [x - y for x, y in zip(a, b, strict=True)]
 
 
-def cross(a: Vector, b: Vector) -> list[int]:
+def along(a: Vector, s: int | Fraction, b: Vector) -> list[int | Fraction]:
+    """The point a + s b."""
+    return [x + s * y for x, y in zip(a, b, strict=True)]
+
+
+def cross(a: Vector, b: Vector) -> list[int | Fraction]:
     """Cross product."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def dot(a: Vector, b: Vector) -> int:
+def dot(a: Vector, b: Vector) -> int | Fraction:
     """Scalar product."""
     return sum(x * y for x, y in zip(a, b, strict=True))
 
 
-def sign(value: int) -> int:
+def sign(value: int | Fraction) -> int:
     """-1, 0 or 1."""
     return (value > 0) - (value < 0)
 
 
-def crossing_kind(origin: np.ndarray, end: np.ndarray, triangle: np.ndarray) -> int:
-    """How the open segment meets the closed triangle: MISS, GRAZE or BLOCKED (through its inside).
-
-    Args:
-        origin: 3 float64 [grid steps].
-        end: 3 float64.
-        triangle: corners, shape (3, 3), integers, not degenerate.
-    """
-    (o, e), scale = as_integers(origin, end)
-    a, b, c = ([int(x) * scale for x in corner] for corner in triangle)
-    normal = cross(minus(b, a), minus(c, a))
-    before, after = sign(dot(normal, minus(o, a))), sign(dot(normal, minus(e, a)))
-    if before == 0 == after:
-        return GRAZE if _meets_in_plane(o, e, (a, b, c), normal) else MISS
-    if before * after >= 0:
-        return MISS
-    along = minus(e, o)
-    turns = [sign(dot(along, cross(minus(u, o), minus(v, o)))) for u, v in ((a, b), (b, c), (c, a))]
-    if 1 in turns and -1 in turns:
-        return MISS
-    return GRAZE if 0 in turns else BLOCKED
-
-
-def crossing_time(origin: np.ndarray, end: np.ndarray, triangle: np.ndarray) -> Fraction:
-    """Where the segment crosses the triangle's plane, 0 at the origin and 1 at the end; they must not be parallel."""
-    (o, e), scale = as_integers(origin, end)
-    a, b, c = ([int(x) * scale for x in corner] for corner in triangle)
-    normal = cross(minus(b, a), minus(c, a))
-    return Fraction(dot(normal, minus(a, o)), dot(normal, minus(e, o)))
-
-
-def column_crossing(point: np.ndarray, triangle: np.ndarray) -> tuple[int, bool]:
-    """Signed crossing of the column above a point with a triangle, and whether the point lies on the triangle.
-
-    The point is moved by (d, d*d, 0) for a d too small to matter, so the column meets no edge: crossings of a closed
-    surface then add up to its winding number. The sign is that of the normal's z component.
-    """
-    (p,), scale = as_integers(point)
-    corners = [[int(x) * scale for x in corner] for corner in triangle]
-    a, b, c = corners
-    normal = cross(minus(b, a), minus(c, a))
-    height = dot(normal, minus(p, a))
-    if height == 0 and _meets_in_plane(p, p, corners, normal):
-        return 0, True
-    turns = set()
-    for u, v in ((a, b), (b, c), (c, a)):
-        x, y = v[0] - u[0], v[1] - u[1]
-        turns.add(sign(x * (p[1] - u[1]) - y * (p[0] - u[0])) or sign(-y) or sign(x))
-    inside = turns == {sign(normal[2])} and normal[2] != 0
-    return (sign(normal[2]) if inside and height * normal[2] < 0 else 0), False
-
-
-def _meets_in_plane(o: Vector, e: Vector, corners: Sequence[Vector], normal: Vector) -> bool:
-    """Whether the open segment o e (or the point o == e) in the triangle's plane meets the closed triangle."""
-    drop = max(range(3), key=lambda axis: abs(normal[axis]))
-    i, j = (drop + 1) % 3, (drop + 2) % 3
-    first, last = Fraction(0), Fraction(1)
-    for edge in range(3):
-        u, v = corners[edge], corners[(edge + 1) % 3]
-        here, there = (
-            ((v[i] - u[i]) * (p[j] - u[j]) - (v[j] - u[j]) * (p[i] - u[i])) * sign(normal[drop]) for p in (o, e)
-        )
-        if here < 0 and there < 0:
-            return False
-        if here < 0 or there < 0:
-            at = Fraction(here, here - there)
-            first, last = (max(first, at), last) if here < 0 else (first, min(last, at))
-    # The ends do not belong to the segment, unless it is a point.
-    return first <= last and (list(o) == list(e) or (last > 0 and first < 1))
+def clip(polygon: Sequence[Vector], m: Vector, c: int | Fraction = 0) -> list[Vector]:
+    """The part of a convex polygon with m . q >= c."""
+    out = []
+    for a, b in zip(polygon, [*polygon[1:], *polygon[:1]], strict=True):
+        here, there = dot(m, a) - c, dot(m, b) - c
+        if here >= 0:
+            out.append(a)
+        if here * there < 0:
+            out.append(along(a, Fraction(here, here - there), minus(b, a)))
+    return out

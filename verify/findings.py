@@ -13,7 +13,7 @@ from .rays.embree import Caster
 from .rays.witness import Confirmed, visible_rows
 
 if TYPE_CHECKING:
-    from ..data.store.database import Bake
+    from ..data.store.bake_folder import BakeFolder
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class VerifyResult:
         return "\n".join([*lines, *(["", *(f"refuted: {line}" for line in refuted)] if refuted else [])])
 
 
-def count_pairs(bake: "Bake", caster: Caster | None = None) -> list[Counts]:
+def count_pairs(bake: "BakeFolder", caster: Caster | None = None) -> list[Counts]:
     """Pairs by class of targets: inhabitable cells, other cells, objects; with what a caster's rays saw, if given."""
     inhabitable = bake.graph.inhabitable
     tables = (

@@ -4,35 +4,16 @@ Exit 0: done, nothing forbidden found; 1: a check failed; 2: unusable input or a
 """
 
 import argparse
-import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 from .. import __version__
 from ..data.errors import InputError
+from .terminal import INTERRUPTED, UNUSABLE, complain
 
-FAILED, UNUSABLE, INTERRUPTED = 1, 2, 130
 # Seeds go to kernels as int32.
 SEED_LIMIT = 2**31
-# Options of `bake` that are settings, by their names in the parser and in Settings.
-BAKE_SETTINGS = {
-    "threshold": "threshold_m2",
-    "seed": "seed",
-    "doors": "doors",
-    "method": "method",
-    "cells": "cells",
-    "cell_size": "cell_size_m",
-    "depth": "depth",
-    "refine_triangles": "refine_triangles",
-    "refine_gap": "refine_gap",
-    "certify": "certify",
-    "split": "split",
-    "lods": "lods",
-    "pixels": "pixels",
-    "resolution": "image",
-    "fov": "fov_deg",
-}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -53,35 +34,21 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         return getattr(commands, options.run)(options)
     except KeyboardInterrupt:
-        _complain("interrupted; run the same command again to resume")
+        complain("interrupted; run the same command again to resume")
         return INTERRUPTED
     except InputError as error:
-        _complain(str(error))
+        complain(str(error))
     except MemoryError as error:
-        _complain(f"expected enough memory, found too little{f' ({error})' if str(error) else ''}")
+        complain(f"expected enough memory, found too little{f' ({error})' if str(error) else ''}")
     except RuntimeError as error:
         # Warp's own way to say that a device's memory is full.
         if "Failed to allocate" not in str(error):
             raise
-        _complain(f"expected enough memory on the device, found too little ({error})")
+        complain(f"expected enough memory on the device, found too little ({error})")
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        _complain(f"{where}expected to be able to read and write, found {error.strerror or error}")
+        complain(f"{where}expected to be able to read and write, found {error.strerror or error}")
     return UNUSABLE
-
-
-def say(text: str) -> None:
-    """Print a result; a reader that has gone away changes neither the work nor the exit code."""
-    try:
-        print(text, flush=True)
-    except BrokenPipeError:
-        # Python flushes stdout once more at exit; that must not fail either.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _complain(message: str) -> None:
-    """One line on stderr, whatever the message."""
-    print(f"viewcell: {' '.join(message.split())}", file=sys.stderr)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -89,7 +56,7 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Complain and exit 2."""
-        _complain(f"{message} (see {self.prog} --help)")
+        complain(f"{message} (see {self.prog} --help)")
         raise SystemExit(UNUSABLE)
 
 
@@ -177,50 +144,8 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
     bake = _command(commands, "bake", "bake", "Compute what can be seen from each cell of a model.")
     bake.add_argument("model", metavar="MODEL", help="IFC, glTF, OBJ, PLY, STL, a scene folder, or cells and portals")
     bake.add_argument("--out", metavar="BAKE", help="folder to write; MODEL's name with .bake by default")
-    bake.add_argument(
-        "--method",
-        choices=["auto", "portals", "occluders", "both", "vlod"],
-        default="auto",
-        help="what proves things hidden; auto, the default: portals in rooms, occluders where they fall short; "
-        "vlod: projection points, to compare and to tune",
-    )
-    bake.add_argument(
-        "--cells",
-        default="",
-        metavar="FILE",
-        help="view cells: a Parquet or CSV table of boxes, or octree, or portals; the method's own by default",
-    )
-    bake.add_argument("--cell-size", type=_number, default=4.0, metavar="M", help="of an octree's roots; 4 by default")
-    bake.add_argument("--depth", type=_whole(0, 12), default=2, help="times an octree's cell is refined; 2 by default")
-    bake.add_argument(
-        "--refine-triangles", type=_whole(1), default=100_000, metavar="N", help="refine a cell that may see more"
-    )
-    bake.add_argument(
-        "--refine-gap",
-        type=_number,
-        default=0.25,
-        metavar="SHARE",
-        help="refine a cell if more of its set than this is unknown",
-    )
-    bake.add_argument(
-        "--certify", action="store_true", help="store a certificate of all that is hidden, and hide nothing else"
-    )
-    bake.add_argument("--split", action="store_true", help="make connected components objects of their own")
-    bake.add_argument(
-        "--lods", action="store_true", help="simplify shapes that have one level, and say which level does from where"
-    )
-    bake.add_argument(
-        "--pixels", type=_number, metavar="N", help="by how much a level may deviate on the image; 1 by default"
-    )
-    bake.add_argument("--resolution", metavar="WxH", help="of that image; 1920x1080 by default")
-    bake.add_argument("--fov", type=_number, metavar="DEG", help="its vertical field of view; 60 by default")
     bake.add_argument("--up", choices=["y", "z"], help="axis that points up in a mesh file")
     bake.add_argument("--unit", help="unit of a mesh file, a name or metres; metre by default")
-    bake.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")
-    bake.add_argument(
-        "--threshold", type=_number, default=0.0, metavar="M2", help="planes with less opaque area do not cut cells"
-    )
-    _seed(bake, "random sightlines")
     bake.add_argument(
         "--budget", type=_number, metavar="SECONDS", help="stop refining then; the rest is unknown, never hidden"
     )
@@ -233,8 +158,37 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
         metavar="FILE",
         help="JSON with keys of Settings, or a file that viewcell tune has written; options given here go before it",
     )
-    # What is not given is left to the settings file, or to Settings.
-    bake.set_defaults(**dict.fromkeys(BAKE_SETTINGS))
+    _add_settings(bake.add_argument_group("what the answer depends on"))
+
+
+def _add_settings(group: argparse._ArgumentGroup) -> None:
+    """Options that are settings of a bake, under their names in `Settings`; None where the user says nothing."""
+    for option, of, metavar, read, text in (
+        ("--cells", "cells", "FILE", str, "a table of boxes, or octree, or portals; the method's own by default"),
+        ("--threshold", "threshold_m2", "M2", _number, "planes with less opaque area do not cut cells"),
+        ("--cell-size", "cell_size_m", "M", _number, "of an octree's roots; 4 by default"),
+        ("--depth", "depth", None, _whole(0, 12), "times an octree's cell is refined; 2 by default"),
+        ("--refine-triangles", "refine_triangles", "N", _whole(1), "refine a cell that may see more"),
+        ("--refine-gap", "refine_gap", "SHARE", _number, "refine a cell if more of its set than this is unknown"),
+        ("--seed", "seed", None, _whole(0, SEED_LIMIT - 1), "of random sightlines; 0 by default"),
+        ("--pixels", "pixels", "N", _number, "by how much a level may deviate on the image; 1 by default"),
+        ("--image", "image", "WxH", str, "size of that image; 1920x1080 by default"),
+        ("--fov", "fov_deg", "DEG", _number, "its vertical field of view; 60 by default"),
+    ):
+        group.add_argument(option, dest=of, metavar=metavar or option[2:].upper(), type=read, help=text)
+    for option, text in (
+        ("--certify", "store a certificate of all that is hidden, and hide nothing else"),
+        ("--split", "make connected components objects of their own"),
+        ("--lods", "simplify shapes that have one level, and say which level does from where"),
+    ):
+        group.add_argument(option, action="store_true", default=None, help=text)
+    group.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")
+    group.add_argument(
+        "--method",
+        choices=["auto", "portals", "occluders", "both", "vlod"],
+        help="what proves things hidden; auto, the default: portals in rooms, occluders where they fall short; "
+        "vlod: projection points, to compare and to tune",
+    )
 
 
 def _add_verify(commands: argparse._SubParsersAction) -> None:
@@ -289,7 +243,7 @@ def _add_check(commands: argparse._SubParsersAction) -> None:
     _seed(check, "rays")
 
 
-def _resolution(text: str) -> tuple[int, int]:
+def _image(text: str) -> tuple[int, int]:
     """Reads WIDTHxHEIGHT."""
     parts = text.lower().split("x")
     try:
@@ -330,7 +284,7 @@ def _add_tune_lod(solvers: argparse._SubParsersAction) -> None:
         "--budget-ms", type=_numbers, metavar="MS,MS", help="frame times to aim at; three telling ones by default"
     )
     lod.add_argument(
-        "--resolution", type=_resolution, default=(640, 480), metavar="WxH", help="in pixels; 640x480 by default"
+        "--image", type=_image, default=(640, 480), metavar="WxH", help="its size in pixels; 640x480 by default"
     )
     lod.add_argument("--fov", type=_number, default=60.0, metavar="DEG", help="vertical field of view; 60 by default")
     lod.add_argument(

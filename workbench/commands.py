@@ -8,12 +8,13 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..data.errors import InputError
-from .cli import BAKE_SETTINGS, FAILED, say
 from .summary import summary, table
+from .terminal import FAILED, say
 
 if TYPE_CHECKING:
     from ..data.scene import Scene
@@ -67,13 +68,15 @@ def _scene_writer(name: str) -> tuple[Path, Callable[["Scene", Path], None]]:
 
 def bake(options: argparse.Namespace) -> int:
     """Bake a model and print what came of it."""
-    from .bake.run import Settings, default_out
     from .bake.run import bake as compute
+    from .bake.run import default_out
+    from .bake.settings import Settings
     from .bake.settings_file import SettingsFile, read_settings
 
     _start_warp()
     model = Path(options.model)
-    given = {key: getattr(options, name) for name, key in BAKE_SETTINGS.items() if getattr(options, name) is not None}
+    asked = {field.name: getattr(options, field.name, None) for field in fields(Settings)}
+    given = {name: value for name, value in asked.items() if value is not None}
     file = read_settings(options.settings) if options.settings else SettingsFile({}, {})
     settings = Settings(**(file.settings | given))
     # The reader of the model is told, too.
@@ -128,7 +131,7 @@ def _stamp(out: Path) -> tuple[int, int] | None:
 
 def verify(options: argparse.Namespace) -> int:
     """Check a bake, or one case; the exit code says whether it stood."""
-    from ..data.store.database import load
+    from .baked import load
 
     _start_warp()
     if options.hard_cases:
@@ -141,7 +144,6 @@ def verify(options: argparse.Namespace) -> int:
         raise InputError("verify: expected a bake folder and no case beside --certificates")
     made = None if options.bake is None else load(options.bake)
     from .verify import replay
-    from .verify import verify as check
 
     if options.replay is not None:
         outcome = replay(options.replay, made)
@@ -153,7 +155,7 @@ def verify(options: argparse.Namespace) -> int:
         found = check_certificates(made)
         say("\n".join([found.line(), *(f"refuted: {line}" for line in found.examples)]))
         return FAILED if found.failed else 0
-    result = check(made, rays=options.rays, seed=options.seed, progress=_progress(options))
+    result = made.verify(rays=options.rays, seed=options.seed, progress=_progress(options))
     say(result.table())
     return 0 if result.ok else FAILED
 
@@ -204,7 +206,7 @@ def check(options: argparse.Namespace) -> int:
 
 def tune_points(options: argparse.Namespace) -> int:
     """Try ways to choose projection points, print what came of it and write it down."""
-    from ..data.store.database import load
+    from .baked import load
     from .tune.points import point_lines, tune_projection_point
 
     _start_warp()
@@ -220,9 +222,9 @@ def tune_points(options: argparse.Namespace) -> int:
 def tune_lod(options: argparse.Namespace) -> int:
     """Try ways to choose levels of detail, print what came of it and write it down."""
     from ..data.camera import Screen
-    from ..data.store.database import load
+    from .baked import load
 
-    screen = Screen(*options.resolution, options.fov)
+    screen = Screen(*options.image, options.fov)
     _start_warp()
     made = load(options.bake)
     from ..solvers.levels.benefit import BenefitSettings
@@ -251,7 +253,7 @@ def tune_lod(options: argparse.Namespace) -> int:
 
 def report(options: argparse.Namespace) -> int:
     """Write a report and say where it is."""
-    from ..data.store.database import load
+    from .baked import load
 
     made = load(options.bake)
     from .report.run import report as write
@@ -314,7 +316,7 @@ def _progress(options: argparse.Namespace) -> bool:
 
 def curves(options: argparse.Namespace) -> int:
     """Sweep the knobs, draw the curves and say which settings are worth their time."""
-    from ..data.store.database import load
+    from .baked import load
     from .curves import curve_lines, sweep, write_curves
 
     if options.stability == (options.bake is not None):
@@ -345,8 +347,8 @@ def _stability(options: argparse.Namespace) -> int:
 
 def export(options: argparse.Namespace) -> int:
     """Write cells and portals as a portal file and say how to judge what another tool makes of them."""
-    from ..data.store.database import load
     from ..data.store.quake import UNIT_STEPS, write_prt
+    from .baked import load
 
     made, out = load(options.bake), Path(options.prt)
     if not made.graph.portal_count:

@@ -19,9 +19,10 @@ import numpy as np
 from tqdm import tqdm
 
 from ..data.errors import InputError
-from ..data.view_cells import write_view_cells
+from ..data.store.view_cells import write_view_cells
 from ..verify.rays.witness import visible_rows, witnessed_objects
-from .bake.run import Settings, bake
+from .bake.run import bake
+from .bake.settings import Settings
 from .files import write_files
 from .summary import table
 from .tune.plots import COLOURS, MARKERS
@@ -30,7 +31,7 @@ from .verify import seen_by_rays
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..data.store.database import Bake
+    from ..data.store.bake_folder import BakeFolder
 
 THRESHOLDS_M2 = (0.0, 1.0, 4.0)
 SPLITS = (1, 2)
@@ -118,7 +119,7 @@ class _Run:
     apart: bool = False
 
 
-def sweep(bake_: "Bake", *, cells: int = 8, seed: int = 0, progress: bool = False) -> Curves:
+def sweep(bake_: "BakeFolder", *, cells: int = 8, seed: int = 0, progress: bool = False) -> Curves:
     """Sweep the knobs of portals, occluders, both, projection points and sampling over some view cells of a bake.
 
     Args:
@@ -165,7 +166,7 @@ def _point(run: _Run, truth: np.ndarray) -> Point:
 class _Sweeper:
     """Sweeps over view cells of a model: each is a bake of a table of these cells."""
 
-    def __init__(self, bake_: "Bake", chosen: np.ndarray, folder: Path, seed: int) -> None:
+    def __init__(self, bake_: "BakeFolder", chosen: np.ndarray, folder: Path, seed: int) -> None:
         self._scene, self._folder, self._seed, self._count = bake_.scene, folder, seed, 0
         self._boxes = bake_.graph.cells[chosen].astype(np.int64)
 
@@ -192,7 +193,7 @@ class _Sweeper:
             yield self._run("projection points", "clusters", clusters, Settings(method="vlod", clusters=clusters))
         yield from _sampled(made, "rays a cell", RAYS, False, self._seed)
 
-    def budgets(self, whole: "Bake") -> Iterator[_Run]:
+    def budgets(self, whole: "BakeFolder") -> Iterator[_Run]:
         """All inhabitable cells at once, stopped early."""
         if _seconds(whole) > WHOLE_S:
             return
@@ -226,7 +227,7 @@ class _Sweeper:
             points.append(Point(pixels, float("nan"), float(share), float("nan"), 0))
         return Series(LEVELS, "pixels", points)
 
-    def _bake(self, boxes: np.ndarray, settings: Settings, budget_s: float | None = None) -> "Bake":
+    def _bake(self, boxes: np.ndarray, settings: Settings, budget_s: float | None = None) -> "BakeFolder":
         """A bake of view cells [grid steps], in a folder of its own."""
         self._count += 1
         table, scene = self._folder / f"{self._count}.csv", self._scene
@@ -254,7 +255,7 @@ class _Sweeper:
 class _GraphSweeper:
     """Sweeps over all cells of a bare graph, whose portals are decided exactly."""
 
-    def __init__(self, bake_: "Bake", seed: int) -> None:
+    def __init__(self, bake_: "BakeFolder", seed: int) -> None:
         self._bake, self._seed = bake_, seed
 
     def runs(self) -> Iterator[_Run]:
@@ -265,16 +266,16 @@ class _GraphSweeper:
         yield from _sampled(bake_, "rays a cell", GRAPH_RAYS, True, self._seed)
 
 
-def _run(made: "Bake", method: str, knob: str, value: float) -> _Run:
+def _run(made: "BakeFolder", method: str, knob: str, value: float) -> _Run:
     return _Run(method, knob, value, _seconds(made), made.potential_objects, witnessed_objects(made))
 
 
-def _seconds(made: "Bake") -> float:
+def _seconds(made: "BakeFolder") -> float:
     """Visibility alone: reading, cutting cells and preparing occluders take as long for one cell as for all."""
     return made.manifest["seconds"]["flood"]
 
 
-def _sampled(made: "Bake", knob: str, counts: tuple[int, ...], cells: bool, seed: int) -> Iterator[_Run]:
+def _sampled(made: "BakeFolder", knob: str, counts: tuple[int, ...], cells: bool, seed: int) -> Iterator[_Run]:
     """What so many rays from each inhabitable cell show, as if nothing else were there."""
     stands = made.graph.inhabitable
     for rays in counts:
@@ -284,7 +285,7 @@ def _sampled(made: "Bake", knob: str, counts: tuple[int, ...], cells: bool, seed
         yield _Run(SAMPLING, knob, rays, time.perf_counter() - begin, found, found)
 
 
-def _seen_cells(made: "Bake") -> np.ndarray:
+def _seen_cells(made: "BakeFolder") -> np.ndarray:
     """Cells with a witness, shape (cells, cells), bool."""
     rows, out = visible_rows(made.cell_to_cell), np.zeros_like(made.potential_cells)
     out[rows["cell_id"].to_numpy(), rows["reached_cell_id"].to_numpy()] = True

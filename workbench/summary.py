@@ -3,13 +3,13 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..data.store.database import Bake
+    from ..data.store.bake_folder import BakeFolder
 
 SKIPPED_SHOWN = 3
 LEAK_SHOWN = 12
 
 
-def summary(bake: "Bake") -> str:
+def summary(bake: "BakeFolder") -> str:
     """Counts, potential and seen pairs, seconds, and what was left out."""
     from ..verify.findings import count_pairs
 
@@ -35,7 +35,7 @@ def summary(bake: "Bake") -> str:
     return "\n".join(lines + _skipped(facts.get("skipped", [])))
 
 
-def _certificates(bake: "Bake") -> str:
+def _certificates(bake: "BakeFolder") -> str:
     """Number of proofs, their size on disk, and what it took to write them down."""
     from ..data.store.certificates import TABLES
 

@@ -2,7 +2,6 @@
 
 import time
 from concurrent.futures import ThreadPoolExecutor
-from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,9 +10,10 @@ import numpy as np
 from tqdm import tqdm
 
 from ..data.errors import InputError
-from ..data.scene import Role
+from ..data.scene import OPAQUE, Role
 from ..verify.cases.case_file import WrongHidden, read_case, write_case
 from ..verify.exact.sightline import Sightlines
+from ..verify.exact.trace import contact_links, portal_links
 from ..verify.findings import VerifyResult, count_pairs
 from ..verify.proofs.line_tree import check_certificates, has_certificates
 from ..verify.rays.adjudicate import Judge, Judgement, sightline_end
@@ -21,11 +21,10 @@ from ..verify.rays.embree import Candidates, Caster
 from ..verify.rays.falsify import Falsifier
 from ..verify.rays.near_misses import certificate_hints
 from ..verify.rays.starts import ORIGINS_MOST, aim_points, cell_origins, frontier_points
-from ..verify.rays.trace import contact_links, portal_links
 from ..verify.rays.witness import CHUNK, confirm_cells, confirm_objects, read_witnesses, visible_rows
 
 if TYPE_CHECKING:
-    from ..data.store.database import Bake
+    from ..data.store.bake_folder import BakeFolder
 
 BATCH_RAYS = 100_000
 # Rays of a cell at a time where nothing is judged in between.
@@ -42,7 +41,7 @@ RATE_BLOCKS = 5
 KINDS = ("cell", "object")
 
 
-def verify(bake: "Bake", *, rays: int = 1_000_000, seed: int = 0, progress: bool = False) -> VerifyResult:
+def verify_bake(bake: "BakeFolder", *, rays: int = 1_000_000, seed: int = 0, progress: bool = False) -> VerifyResult:
     """Try to refute a bake; a bake of a bare cell graph is checked against its portals.
 
     Args:
@@ -61,10 +60,10 @@ def verify(bake: "Bake", *, rays: int = 1_000_000, seed: int = 0, progress: bool
         raise InputError(f"rays: expected 0 or more, found {rays}")
     result, start = VerifyResult(), time.perf_counter()
     judge = make_judge(bake)
-    sources = np.flatnonzero(bake.graph.inhabitable)
-    caster, sources = _make_caster(bake, judge, sources, rays, seed, result)
+    caster, dark = make_caster(bake, judge, (bake.potential_cells, bake.potential_objects), rays, seed)
+    result.dark_cells = len(dark)
     result.seconds["prepare"] = time.perf_counter() - start
-    if rays and len(sources):
+    if rays and caster is not None:
         _cast_all(bake, caster, judge, rays, progress, result)
         if bake.scene is not None and not result.wrong_hidden:
             _hunt(bake, caster, judge, rays // GUIDED, progress, result)
@@ -106,7 +105,7 @@ class Replayed:
         return f"{state}: {pair}: bake says {verdict}, the sightline is {self.judgement.name.lower()}"
 
 
-def replay(path: str | Path, bake: "Bake | None" = None) -> Replayed:
+def replay(path: str | Path, bake: "BakeFolder | None" = None) -> Replayed:
     """Judge the sightline of a case file again.
 
     Args:
@@ -118,9 +117,9 @@ def replay(path: str | Path, bake: "Bake | None" = None) -> Replayed:
     """
     case = read_case(path)
     if bake is None:
-        from ..data.store.database import load
+        from ..data.store.bake_folder import read_bake
 
-        bake = load(case.bake)
+        bake = read_bake(case.bake)
     table = bake.potential_cells if case.kind == "cell" else bake.potential_objects
     if not (0 <= case.cell < table.shape[0] and 0 <= case.target < table.shape[1]):
         raise InputError(f"{path}: expected ids below {table.shape}, found cell {case.cell}, target {case.target}")
@@ -129,34 +128,40 @@ def replay(path: str | Path, bake: "Bake | None" = None) -> Replayed:
     return Replayed(case, not table[case.cell, case.target], judgement)
 
 
-def make_judge(bake: "Bake") -> Judge:
+def make_judge(bake: "BakeFolder") -> Judge:
     """The exact judge of a bake's sightlines."""
     links = portal_links(bake.graph)
     if bake.scene is None:
         nothing = Sightlines(np.zeros((0, 3, 3), np.int32))
         return Judge(bake.graph, None, nothing, links)
-    triangles, owners = bake.scene.triangles()
-    opaque = bake.scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
-    lines, glass = (Sightlines(triangles[part], owners[part]) for part in (opaque, ~opaque))
+    lines, glass = (Sightlines(*bake.scene.triangles(*roles)) for roles in (OPAQUE, [Role.TRANSPARENT]))
     seal = float(bake.manifest.get("settings", {}).get("seal", 0.0) or 0.0)
     return Judge(bake.graph, lines, glass, links, seal / bake.grid_m)
 
 
-def _make_caster(
-    bake: "Bake", judge: Judge, sources: np.ndarray, rays: int, seed: int, result: VerifyResult
+def make_caster(
+    bake: "BakeFolder", judge: Judge, claims: tuple[np.ndarray, np.ndarray], rays: int, seed: int
 ) -> tuple[Caster | None, np.ndarray]:
-    """Caster of the inhabitable cells that hold a free point, and those cells."""
+    """Caster of the inhabitable cells that hold a free point, and the dark cells, which hold none.
+
+    Args:
+        bake: its model, or graph, and cells are used.
+        judge: of its sightlines.
+        claims: potentially visible cells and objects, shapes (cells, cells) and (cells, objects), bool.
+        rays: that are to be cast.
+        seed: of origins and directions.
+    """
+    sources = np.flatnonzero(bake.graph.inhabitable)
     none = Sightlines(np.zeros((0, 3, 3), np.int32))
     lines, glass = judge.lines or none, judge.glass
     share = -(-rays // max(len(sources), 1))
     wanted = int(np.clip(share // 32, 8, ORIGINS_MOST))
     spots = cell_origins(bake.graph, sources, wanted, lines, seed)
     lit = np.array([len(own) > 0 for own in spots], bool)
-    result.dark_cells = int((~lit).sum())
-    sources = sources[lit]
+    dark, sources = sources[~lit], sources[lit]
     if not len(sources):
-        return None, sources
-    potential = bake.potential_cells[sources]
+        return None, dark
+    potential = claims[0][sources]
     links = judge.links if judge.lines is None else contact_links(bake.graph.cells)
     caster = Caster(
         sources=sources,
@@ -166,15 +171,15 @@ def _make_caster(
         boxes=bake.graph.cells,
         links=links,
         potential_cells=potential,
-        potential_objects=bake.potential_objects[sources],
+        potential_objects=claims[1][sources],
         opaque=(lines.triangles, lines.owners),
         glass=(glass.triangles, glass.owners),
         seed=seed,
     )
-    return caster, sources
+    return caster, dark
 
 
-def seen_by_rays(bake: "Bake", rays: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def seen_by_rays(bake: "BakeFolder", rays: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Cells that rays enter and objects that they hit, whatever the bake says of them; no exact test.
 
     Args:
@@ -185,21 +190,20 @@ def seen_by_rays(bake: "Bake", rays: int, seed: int = 0) -> tuple[np.ndarray, np
     Returns:
         Shapes (cells, cells) and (cells, objects), bool.
     """
-    everything = copy(bake)
-    for name in ("potential_cells", "potential_objects"):
-        everything.__dict__[name] = np.ones_like(getattr(bake, name))
-    sources = np.flatnonzero(bake.graph.inhabitable)
-    found = tuple(np.zeros_like(getattr(bake, name)) for name in ("potential_cells", "potential_objects"))
-    caster, sources = _make_caster(everything, make_judge(bake), sources, rays, seed, VerifyResult())
+    found = tuple(np.zeros_like(claims) for claims in (bake.potential_cells, bake.potential_objects))
+    everything = tuple(np.ones_like(claims) for claims in found)
+    caster, _ = make_caster(bake, make_judge(bake), everything, rays, seed)
     if caster is not None:
-        each = -(-rays // len(sources))
+        each = -(-rays // len(caster.sources))
         for first in range(0, each, RUN_MOST):
             caster.cast(first, min(RUN_MOST, each - first))
-        found[0][sources], found[1][sources] = caster.seen_cells > 0, caster.seen_objects > 0
+        found[0][caster.sources], found[1][caster.sources] = caster.seen_cells > 0, caster.seen_objects > 0
     return found
 
 
-def _cast_all(bake: "Bake", caster: Caster, judge: Judge, rays: int, progress: bool, result: VerifyResult) -> None:
+def _cast_all(
+    bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, progress: bool, result: VerifyResult
+) -> None:
     """Cast in batches on two threads; judge candidates in order; stop at the first wrong-hidden."""
     sources, rows = caster.sources, len(caster.sources)
     total = -(-rays // rows)
@@ -242,7 +246,7 @@ def _blocks(rows: int, total: int) -> list[list[tuple[int, int]]]:
     return [batches[place : place + size] for place in range(0, len(batches), size)]
 
 
-def _hunt(bake: "Bake", caster: Caster, judge: Judge, rays: int, progress: bool, result: VerifyResult) -> None:
+def _hunt(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, progress: bool, result: VerifyResult) -> None:
     """Rays that look where an omission is likeliest, and random ones that bound what is missed."""
     start, sources = time.perf_counter(), caster.sources
     cells = {}
@@ -269,7 +273,9 @@ def _hunt(bake: "Bake", caster: Caster, judge: Judge, rays: int, progress: bool,
     result.seconds["guided rays"] = time.perf_counter() - start
 
 
-def _judge_batch(bake: "Bake", sources: np.ndarray, judge: Judge, found: Candidates, result: VerifyResult) -> bool:
+def _judge_batch(
+    bake: "BakeFolder", sources: np.ndarray, judge: Judge, found: Candidates, result: VerifyResult
+) -> bool:
     """Count a batch's candidates; write the case file of the first wrong-hidden and say True."""
     for number in range(len(found.rows)):
         cell, kind = int(sources[found.rows[number]]), KINDS[found.kinds[number]]
@@ -288,7 +294,7 @@ def _judge_batch(bake: "Bake", sources: np.ndarray, judge: Judge, found: Candida
     return False
 
 
-def _confirm_all(bake: "Bake", judge: Judge, progress: bool, result: VerifyResult) -> None:
+def _confirm_all(bake: "BakeFolder", judge: Judge, progress: bool, result: VerifyResult) -> None:
     """Confirm every stored witness, a chunk of rows at a time."""
     tables = [("cell", "reached_cell_id", bake.cell_to_cell, result.cell_witnesses)]
     if judge.lines is not None:

@@ -38,6 +38,7 @@ from ..blockers import Blockers
 from ..graph import OTHER_AXES
 from ..opaque import decompose
 from ..patches import Patches
+from ..ragged import starts_of
 from ..regions import Regions
 
 TABLES = ("proofs", "trees", "blockers", "leaves", "occluders")
@@ -82,9 +83,9 @@ class Proofs:
             self.cell[chosen],
             self.boxes[chosen],
             self.closed[chosen],
-            _starts(sizes[chosen]),
+            starts_of(sizes[chosen]),
             self.words[np.repeat(chosen, sizes)],
-            _starts(leaves[chosen]),
+            starts_of(leaves[chosen]),
             self.leaves[np.repeat(chosen, leaves)],
             self.seconds,
         )
@@ -100,16 +101,12 @@ def join_proofs(parts: list[Proofs]) -> Proofs:
     parts = [NO_PROOFS, *parts]
     return Proofs(
         *(np.concatenate([getattr(part, name) for part in parts]) for name in ("cell", "boxes", "closed")),
-        _starts(np.concatenate([np.diff(part.word_starts) for part in parts])),
+        starts_of(np.concatenate([np.diff(part.word_starts) for part in parts])),
         np.concatenate([part.words for part in parts]),
-        _starts(np.concatenate([np.diff(part.leaf_starts) for part in parts])),
+        starts_of(np.concatenate([np.diff(part.leaf_starts) for part in parts])),
         np.concatenate([part.leaves for part in parts]),
         sum(part.seconds for part in parts),
     )
-
-
-def _starts(sizes: np.ndarray) -> np.ndarray:
-    return np.concatenate([[0], np.cumsum(sizes)])
 
 
 NO_PROOFS = Proofs(
@@ -140,7 +137,7 @@ def certificate_tables(
     columns = {"proof_id": ids, "cell_id": proofs.cell.astype(np.int32), "closed": proofs.closed}
     columns |= {name: corners[:, i] for i, name in enumerate(CORNERS)}
     sizes = np.diff(proofs.word_starts)
-    words = pa.ListArray.from_arrays(pa.array(_starts(sizes[sizes > 0]).astype(np.int32)), pa.array(proofs.words))
+    words = pa.ListArray.from_arrays(pa.array(starts_of(sizes[sizes > 0]).astype(np.int32)), pa.array(proofs.words))
     nodes = proofs.words[proofs.words >= 0]
     owner = np.repeat(ids, np.diff(proofs.leaf_starts))
     return {

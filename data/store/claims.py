@@ -13,8 +13,8 @@ import numpy as np
 import pyarrow as pa
 
 from ..errors import InputError
-from ..view_cells import ViewCells, read_rows
 from .scene_folder import one_line, read_manifest
+from .view_cells import ViewCells, read_rows
 
 TARGETS = {"object": "object_id", "cell": "reached_cell_id"}
 # What a column `verdict` may say, and whether the pair is in the potentially visible set.

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..graph import OTHER_AXES, CellGraph
+from ..ragged import starts_of
 from ..scene import GRID_LIMIT
 from .graph_folder import check_graph
 
@@ -94,7 +95,7 @@ def read_prt(path: str | Path) -> LeafPortals:
             raise InputError(f"{where}: expected two leaves from 0 to {counts[0] - 1}, found {a} and {b}")
         leaves[row], sizes[row] = (a, b), size
         corners += values
-    starts = np.concatenate([[0], np.cumsum(sizes)])
+    starts = starts_of(sizes)
     return LeafPortals(counts[0], leaves, starts, np.array(corners, np.float64).reshape(-1, 3))
 
 

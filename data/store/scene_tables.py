@@ -7,6 +7,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..errors import InputError
+from ..ragged import starts_of
 from ..scene import Definition, Instance, Mesh, Role, Scene, Space
 
 BOX_COLUMNS = ("min_x", "min_y", "min_z", "max_x", "max_y", "max_z")
@@ -173,7 +174,7 @@ def _check_faces(faces: np.ndarray, vertex_count: int, where: str) -> None:
 def _lists(arrays: list[np.ndarray], dtype: type) -> pa.ListArray:
     """A list column from arrays of any shape, read row by row."""
     flat = [np.asarray(array, dtype).ravel() for array in arrays]
-    offsets = np.concatenate([[0], np.cumsum([len(array) for array in flat])]).astype(np.int32)
+    offsets = starts_of([len(array) for array in flat]).astype(np.int32)
     values = np.concatenate([np.zeros(0, dtype), *flat])
     return pa.ListArray.from_arrays(pa.array(offsets), pa.array(values))
 

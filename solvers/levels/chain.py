@@ -15,7 +15,7 @@ from ...data.lod import simplified, watertight, welded
 from ...data.scene import Definition, Mesh, Scene
 from ...kernels import deviation
 from ...kernels.deviation import launch_deviation
-from ...kernels.launch import thread_count
+from ...kernels.launch import CPU, Device
 
 # A level has at most this share of the triangles of the one before.
 SHARE = 0.75
@@ -40,7 +40,7 @@ class LodChain:
     ended: str
 
 
-def lod_chain(mesh: Mesh, *, coarsest: int = COARSEST, where: str = "mesh", device: str = "cpu") -> LodChain:
+def lod_chain(mesh: Mesh, *, coarsest: int = COARSEST, where: str = "mesh", device: Device = CPU) -> LodChain:
     """Halve a mesh until it has at most `coarsest` triangles.
 
     A mesh with non-manifold edges, holes or overlapping parts is simplified like any other, with the same bound, but
@@ -51,7 +51,7 @@ def lod_chain(mesh: Mesh, *, coarsest: int = COARSEST, where: str = "mesh", devi
         mesh: finest level; its `error_m` is taken to be 0.
         coarsest: triangles that the last level may have; a mesh that has no more is its own chain.
         where: what to call the mesh in an error.
-        device: Warp device; the answer does not depend on it.
+        device: where to measure deviations.
 
     Returns:
         The same chain for the same mesh. It ends early where nothing simpler is found, and says so.
@@ -85,7 +85,7 @@ def _surface(mesh: Mesh) -> np.ndarray:
     return corners[(normals != 0).any(axis=1)]
 
 
-def _best(finest: Mesh, surface: np.ndarray, count: int, closed: bool, device: str) -> tuple[Mesh, float] | None:
+def _best(finest: Mesh, surface: np.ndarray, count: int, closed: bool, device: Device) -> tuple[Mesh, float] | None:
     """Of the ways to about half of `count` triangles the one that deviates least, and a lower bound on how much."""
     best = None
     for level in simplified(finest, count // 2):
@@ -97,15 +97,12 @@ def _best(finest: Mesh, surface: np.ndarray, count: int, closed: bool, device: s
     return best
 
 
-def with_lods(
-    scene: Scene, *, threads: int | None = None, device: str = "cpu", progress: bool = False
-) -> tuple[Scene, list[dict[str, str]]]:
+def with_lods(scene: Scene, *, device: Device = CPU, progress: bool = False) -> tuple[Scene, list[dict[str, str]]]:
     """A scene whose definitions of a single level have chains of them; level 0 stays as it was.
 
     Args:
         scene: definitions that have several levels already keep those.
-        threads: definitions at a time; all cores by default. The answer does not depend on it.
-        device: Warp device; the answer does not depend on it.
+        device: where to measure deviations; on as many definitions at a time as it has threads.
         progress: show a progress bar.
 
     Returns:
@@ -117,12 +114,12 @@ def with_lods(
 
     def build(number: int) -> LodChain:
         shape = scene.definitions[number]
-        return lod_chain(shape.lods[0], where=f"definition {number} {shape.name!r}", device=device)
+        return lod_chain(shape.lods[0], where=f"definition {number} {shape.name!r}", device=Device(device.name))
 
     # Once, not in every thread.
-    wp.load_module(deviation.__name__, device=device)
+    wp.load_module(deviation.__name__, device=device.name)
     single = [i for i, shape in enumerate(scene.definitions) if len(shape.lods) == 1]
-    with ThreadPoolExecutor(thread_count(threads)) as pool:
+    with ThreadPoolExecutor(device.threads) as pool:
         made = pool.map(build, single)
         chains = list(tqdm(made, total=len(single), unit="shape", desc="levels of detail", disable=not progress))
     definitions, notes = list(scene.definitions), []

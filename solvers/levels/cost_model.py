@@ -15,7 +15,7 @@ from scipy.optimize import nnls
 
 from ...data.errors import InputError
 from ...data.store.graph_folder import numbers
-from ...data.view_cells import read_rows
+from ...data.store.view_cells import read_rows
 
 COLUMNS = ("primitives", "pixels", "seconds")
 # Four unknowns: fewer rows would fit anything.

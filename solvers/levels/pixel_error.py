@@ -28,8 +28,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...data.camera import Screen
 from ...data.errors import InputError
 
+FULL_HD = Screen(1920, 1080, 60.0)
 # Far above the rounding of the few operations from a distance to a verdict, and from coordinates to a distance.
 ROUNDING = 2.0**-40
 # Pairs at a time, for the memory.
@@ -42,29 +44,22 @@ class PixelLimit:
 
     Attributes:
         pixels: limit on the displacement of a surface on the image, above 0.
-        resolution: width and height [pixels].
-        fov_deg: vertical field of view [degrees], above 0 and below 180.
+        screen: the image.
     """
 
     pixels: float = 1.0
-    resolution: tuple[int, int] = (1920, 1080)
-    fov_deg: float = 60.0
+    screen: Screen = FULL_HD
 
     def __post_init__(self) -> None:
         """Raise InputError for a number out of range."""
         if not 0 < self.pixels < np.inf:
             raise InputError(f"pixels: expected a number above 0, found {self.pixels}")
-        if len(self.resolution) != 2 or not all(0 < side < np.inf for side in self.resolution):
-            raise InputError(f"resolution: expected a width and a height above 0, found {self.resolution}")
-        if not 0 < self.fov_deg < 180:
-            raise InputError(f"fov: expected degrees above 0 and below 180, found {self.fov_deg}")
 
     @property
     def deviation_per_distance(self) -> float:
         """The greatest e / d whose image stays within the limit, wherever on the image; rounded down."""
-        width, height = self.resolution
-        focal = height / 2 / np.tan(np.radians(self.fov_deg) / 2)
-        corner = np.hypot(width, height) / (2 * focal)
+        focal = self.screen.focal
+        corner = np.hypot(self.screen.width, self.screen.height) / (2 * focal)
         limit = self.pixels / (focal * (1 + corner**2) + self.pixels * corner)
         return float(limit / np.hypot(1, limit) * (1 - ROUNDING))
 

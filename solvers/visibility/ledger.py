@@ -1,18 +1,22 @@
-"""Keeping the proofs of what is hidden, and going down a hierarchy with them."""
+"""Keeping the certificates of what is hidden, and going down a hierarchy past what is."""
 
 import time
 from collections.abc import Callable
 
 import numpy as np
 
+from ...data.ragged import starts_of
 from ...data.store.certificates import NO_PROOFS, Proofs, join_proofs
+from ...data.verdict import Verdict
+from ...kernels.blockers import BlockerTree
+from ...kernels.launch import Device
 from ...kernels.line_tree import launch_line_trees
 from ...kernels.shaft import ShaftAnswers
-from ...kernels.target import BlockerTree, TargetAnswers
+from ...kernels.target import TargetAnswers
 
 
 class Ledger:
-    """Collects proofs; with one, only what has a certificate is called hidden."""
+    """Collects certificates; whoever keeps a ledger calls hidden only what has one."""
 
     def __init__(self) -> None:
         self._proofs: list[Proofs] = []
@@ -25,34 +29,28 @@ class Ledger:
         boxes: np.ndarray,
         rows: np.ndarray,
         answers: TargetAnswers,
+        device: Device,
         pair: np.ndarray | None = None,
-        *,
-        threads: int = 1,
-        device: str = "cpu",
     ) -> None:
-        """Enter the line trees of what a search hid; what has none becomes unknown in the answers.
+        """Enter the line trees of what a search hid; what has none becomes UNKNOWN in the answers.
 
         Args:
             tree: blockers, as of `launch_target_search`.
             boxes: likewise.
             rows: likewise; the source of a row is a view cell, and a strict row is about a closed box.
             answers: of the search.
+            device: likewise.
             pair: what each row's target is a piece of, -1 if it is whole, shape (n,); all whole by default.
-            threads: CPU threads.
-            device: Warp device.
         """
         start = time.perf_counter()
-        hidden = np.flatnonzero(answers.verdict == 0)
-        nodes = answers.nodes[hidden]
-        trees = launch_line_trees(tree, boxes, rows[hidden], nodes, threads=threads, device=device)
-        told = np.diff(trees.starts) > 0
-        answers.verdict[hidden[~told]] = 2
-        hidden, starts = hidden[told], np.append(trees.starts[:-1][told], trees.starts[-1])
+        hidden = np.flatnonzero(answers.verdict == Verdict.HIDDEN)
+        trees = launch_line_trees(tree, boxes, rows[hidden], answers.nodes[hidden], device=device)
+        written = np.diff(trees.starts) > 0
+        answers.verdict[hidden[~written]] = Verdict.UNKNOWN
+        hidden, starts = hidden[written], np.append(trees.starts[:-1][written], trees.starts[-1])
         none = np.zeros(len(hidden) + 1, np.int64)
-        target = boxes[rows[hidden, 1]].astype(np.int32)
-        proofs = Proofs(
-            rows[hidden, 0].astype(np.int64), target, rows[hidden, 2] != 0, starts, trees.words, none, NO_PROOFS.leaves
-        )
+        cell, target = rows[hidden, 0].astype(np.int64), boxes[rows[hidden, 1]].astype(np.int32)
+        proofs = Proofs(cell, target, rows[hidden, 2] != 0, starts, trees.words, none, NO_PROOFS.leaves)
         self._enter(proofs, pair if pair is None else pair[hidden])
         self._seconds += time.perf_counter() - start
 
@@ -60,8 +58,8 @@ class Ledger:
         self, cell: np.ndarray, boxes: np.ndarray, answers: ShaftAnswers, pair: np.ndarray | None = None
     ) -> None:
         """Enter the pieces of what the shaft test hid from view cells; `pair` as of `add_lines`."""
-        hidden = np.flatnonzero(answers.verdict == 0)
-        starts = np.concatenate([[0], np.cumsum(answers.leaves[hidden])])
+        hidden = np.flatnonzero(answers.verdict == Verdict.HIDDEN)
+        starts = starts_of(answers.leaves[hidden])
         none, closed = np.zeros(len(hidden) + 1, np.int64), np.ones(len(hidden), bool)
         proofs = Proofs(
             cell[hidden].astype(np.int64), boxes[hidden], closed, none, NO_PROOFS.words, starts, answers.certificate
@@ -73,7 +71,11 @@ class Ledger:
         self._pairs.append(np.full(len(proofs.cell), -1) if pair is None else pair)
 
     def close(self, hidden: np.ndarray) -> Proofs:
-        """All proofs, without those of pieces of pairs that are not hidden; `hidden` is by pair, bool."""
+        """All proofs, but none about pieces of a pair that stays visible elsewhere.
+
+        Args:
+            hidden: whether each pair that `add_lines` or `add_shafts` was given pieces of is hidden, shape (n,), bool.
+        """
         proofs = join_proofs(self._proofs)
         pair = np.concatenate([np.zeros(0, int), *self._pairs])
         kept = proofs.take((pair < 0) | np.append(hidden, False)[pair])
@@ -89,7 +91,7 @@ def descend(
     first_level: int,
     hide: Callable[[np.ndarray, np.ndarray], np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(view cell, item) pairs that no proof for a box around the item, or around several, hides; ordered.
+    """Go down a hierarchy of items from view cells, and give up below every node that is hidden.
 
     Args:
         cells: all view cells [grid steps], shape (n, 2, 3), int32.
@@ -98,6 +100,10 @@ def descend(
         items: item of each node of the last level, -1 for none.
         first_level: to start at: the root is visible from everywhere.
         hide: says of cells and boxes, row by row, which boxes are hidden.
+
+    Returns:
+        View cell and item of every pair that is left, ordered, int64: neither the item's box nor one around it is
+        hidden.
     """
     level = min(first_level, len(levels) - 1)
     source = np.repeat(block, 2**level)

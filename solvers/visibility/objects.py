@@ -1,105 +1,55 @@
-"""Cell-to-object visibility of blocks of source cells.
+"""Cell-to-object visibility of blocks of source cells of a cell-and-portal graph.
 
 An object is potentially visible if some cell that is not hidden holds a part of it whose box, clipped to that cell by
 the object's triangles, a sightline can reach. Source: Funkhouser et al. 1996, section 3.2; the clipped boxes are
 sharper.
 """
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...data.incidence import Incidence
-from ...kernels.sightline import launch_aim
-from .cells import CellRows, Model, outside, search_rounds, seeds, segments
-
-if TYPE_CHECKING:
-    from .occluders import Occlusion
-
-# Sightlines aimed at each object before anything is proved: most visible objects fall to the first few.
-FIRST_TRIES = 12
-AIM_ROUNDS = (32, 128, 512)
-
-
-@dataclass
-class ObjectRows:
-    """Reached (cell, object) pairs of a block of sources, ordered; columns as in data/store/database.py."""
-
-    source: np.ndarray
-    target: np.ndarray
-    seen: np.ndarray
-    origin: np.ndarray
-    end: np.ndarray
-
-    @classmethod
-    def unseen(cls, source: np.ndarray, target: np.ndarray) -> "ObjectRows":
-        """Pairs without a witness."""
-        return cls(source, target, np.zeros(len(source), bool), *np.zeros((2, len(source), 3)))
-
-
-@dataclass
-class ObjectModel:
-    """Where objects lie: their incidence with the cells, and each one's rows among the aim targets."""
-
-    incidence: Incidence
-    ranges: np.ndarray
+from ...data.ragged import places_of
+from ...data.rows import Rows
+from ...data.verdict import Verdict
+from .aim import AIM_ROUNDS, FIRST_TRIES, middles
+from .cells import CellModel
+from .search import search_rounds, segments
 
 
 def object_rows(
-    model: Model, objects: ObjectModel, reached: CellRows, aim_rounds: tuple[int, ...] = AIM_ROUNDS
-) -> ObjectRows:
-    """Every object that is not proved hidden from the sources of `reached`.
+    model: CellModel, incidence: Incidence, reached: Rows, aim_rounds: tuple[int, ...] = AIM_ROUNDS
+) -> Rows:
+    """Every object that is not proved hidden from the sources of `reached`, ordered.
+
+    Args:
+        model: graph and sights.
+        incidence: of the objects with its cells.
+        reached: cells that are not proved hidden.
+        aim_rounds: sightlines shot at each part that could not be hidden, round by round.
 
     Returns:
-        Reached pairs. A pair that is left out is hidden, exactly. A `seen` pair's witness ends on the object, starts
-        outside every solid, and clears all opaque triangles but the object's own.
+        Reached pairs. A pair that is left out is hidden, exactly.
     """
-    incidence = objects.incidence
+    sights, cells = model.sights, model.graph.cells
     sizes = np.diff(incidence.starts)[reached.target]
-    parts = np.repeat(incidence.starts[reached.target], sizes) + _ramp(sizes)
-    part_source = np.repeat(reached.source, sizes)
-    keys, pair_of = np.unique(_key(part_source, incidence.object_id[parts], len(objects.ranges)), return_inverse=True)
-    source, target = np.divmod(keys, len(objects.ranges))
-    rows = ObjectRows.unseen(source, target)
-    cells = model.graph.cells
-    everything = np.arange(len(keys))
-    aim_at_objects(
-        model,
-        cells,
-        objects.ranges,
-        rows,
-        everything,
-        cells[source],
-        cells[np.stack([source, source], axis=1)].mean(axis=2),
-        target,
-        FIRST_TRIES,
-        0,
-    )
-    potential, hints, kept_parts, hint_pair = _prove(model, objects, rows, parts, part_source, pair_of)
+    parts = places_of(incidence.starts[reached.target], sizes)
+    part_source, objects = np.repeat(reached.source, sizes), len(sights.ranges)
+    keys, pair_of = np.unique(part_source * objects + incidence.object_id[parts], return_inverse=True)
+    rows = Rows.unseen(*np.divmod(keys, objects))
+    home = cells[rows.source]
+    sights.aim(rows, np.arange(len(keys)), home, middles(home, home), rows.target, FIRST_TRIES, 0)
+    potential, hints, kept_parts, hint_pair = _prove(model, incidence, rows, parts, part_source, pair_of)
     for number, tries in enumerate(aim_rounds):
         todo = np.flatnonzero(~rows.seen[hint_pair])
         at = kept_parts[todo]
-        boxes = incidence.boxes[at]
-        aim_at_objects(model, cells, objects.ranges, rows, hint_pair[todo], boxes, hints[todo], at, tries, number + 1)
-    kept = np.flatnonzero(potential | rows.seen)
-    return ObjectRows(source[kept], target[kept], rows.seen[kept], rows.origin[kept], rows.end[kept])
-
-
-def _key(source: np.ndarray, target: np.ndarray, count: int) -> np.ndarray:
-    return source.astype(np.int64) * count + target
-
-
-def _ramp(sizes: np.ndarray) -> np.ndarray:
-    """0, 1, ..., n - 1 for each size n, concatenated."""
-    ends = np.cumsum(sizes)
-    return np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - sizes, sizes)
+        sights.aim(rows, hint_pair[todo], incidence.boxes[at], hints[todo], at, tries, number + 1)
+    return rows.take(potential | rows.seen)
 
 
 def _prove(
-    model: Model,
-    objects: ObjectModel,
-    rows: ObjectRows,
+    model: CellModel,
+    incidence: Incidence,
+    rows: Rows,
     parts: np.ndarray,
     part_source: np.ndarray,
     pair_of: np.ndarray,
@@ -110,73 +60,23 @@ def _prove(
         Which pairs stay potential, bool; and for every part that could not be hidden the ends of a line to it, shape
         (n, 2, 3), its row in the incidence, and its pair.
     """
-    incidence, cells = objects.incidence, model.graph.cells
+    cells = model.graph.cells
     todo = np.flatnonzero(~rows.seen[pair_of])
     own = incidence.cell[parts[todo]] == part_source[todo]
-    potential = np.zeros(len(rows.source), bool)
+    potential = np.zeros(len(rows), bool)
     potential[pair_of[todo[own]]] = True
     kept_own = todo[own]
     todo = todo[~own]
     todo = todo[~potential[pair_of[todo]]]
     boxes = np.concatenate([cells, incidence.boxes[parts[todo]]])
     work = np.column_stack([part_source[todo], len(cells) + np.arange(len(todo)), np.ones(len(todo), int)])
-    answers = search_rounds(model, boxes, work)
-    open_rows = np.flatnonzero(answers.verdict != 0)
-    potential[pair_of[todo[open_rows]]] = True
-    kept = np.concatenate([kept_own, todo[open_rows]])
-    hints = np.stack([cells[part_source[kept]].mean(axis=1), incidence.boxes[parts[kept]].mean(axis=1)], axis=1)
-    lined = np.flatnonzero(answers.verdict[open_rows] == 1)
-    at = todo[open_rows[lined]]
-    ends = segments(answers, open_rows[lined], cells[part_source[at]], incidence.boxes[parts[at]])
+    answers = search_rounds(model.tree, boxes, work, model.device)
+    left = np.flatnonzero(answers.verdict != Verdict.HIDDEN)
+    potential[pair_of[todo[left]]] = True
+    kept = np.concatenate([kept_own, todo[left]])
+    hints = middles(cells[part_source[kept]], incidence.boxes[parts[kept]])
+    lined = np.flatnonzero(answers.verdict[left] == Verdict.VISIBLE)
+    at = todo[left[lined]]
+    ends = segments(answers, left[lined], cells[part_source[at]], incidence.boxes[parts[at]])
     hints[len(kept_own) + lined] = np.stack(ends, axis=1)
     return potential, hints, parts[kept], pair_of[kept]
-
-
-def aim_at_objects(
-    model: "Model | Occlusion",
-    cells: np.ndarray,
-    ranges: np.ndarray,
-    rows: ObjectRows,
-    pairs: np.ndarray,
-    boxes: np.ndarray,
-    hints: np.ndarray,
-    streams: np.ndarray,
-    tries: int,
-    number: int,
-) -> None:
-    """Shoot at the objects of the pairs; fills seen, origin and end in place.
-
-    Args:
-        model: triangles, targets and solids, and how to launch.
-        cells: that the pairs' sources number [grid steps], shape (cells, 2, 3), int32.
-        ranges: first and past-the-last target of each object, shape (objects, 2).
-        rows: all pairs.
-        pairs: pair of each attempt; a pair may be attempted through several boxes.
-        boxes: aim at the part of the object inside this box; ignored in round 0.
-        hints: ends of a line that the axial model allows [grid steps], shape (n, 2, 3).
-        streams: what tells the random streams of one source apart, shape (n,), int.
-        tries: sightlines an attempt.
-        number: of the round.
-    """
-    if not len(pairs):
-        return
-    source, target = rows.source[pairs], rows.target[pairs]
-    found, origin, end = launch_aim(
-        model.triangles,
-        model.targets,
-        cells[source],
-        boxes,
-        hints,
-        target,
-        ranges[target],
-        seeds(model.seed + 101 * (number + 1), source, streams),
-        np.full(len(pairs), number > 0),
-        tries=tries,
-        boxed=number > 0,
-        threads=model.threads,
-        device=model.device,
-    )
-    good = np.flatnonzero(found)
-    good = good[outside(model, source[good], origin[good], np.ones(len(good), bool))]
-    rows.seen[pairs[good]] = True
-    rows.origin[pairs[good]], rows.end[pairs[good]] = origin[good], end[good]

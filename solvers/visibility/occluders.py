@@ -8,7 +8,7 @@ middle of a piece that could not be proved is where the next sightlines are aime
 An eye counts only outside every solid, so a view cell may overlap walls and furniture.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -16,74 +16,82 @@ import numpy as np
 from ...data.blockers import Blockers
 from ...data.hierarchy import build_hierarchy
 from ...data.occludees import Occludees
-from ...data.patches import Patches
-from ...data.regions import Regions
-from ...data.solids import SolidIndex
+from ...data.prepared import no_patches, no_regions
+from ...data.ragged import places_of
+from ...data.rows import Rows
 from ...data.store.certificates import Proofs
-from ...kernels.shaft import ShaftAnswers, Shields, device_shields, launch_shaft, patches_met
-from ...kernels.sightline import AimTargets, Triangles
-from ...kernels.target import BlockerTree, TargetAnswers, blocker_tree, launch_target_search
-from .cells import segments
+from ...data.verdict import Verdict
+from ...kernels.blockers import BlockerTree, blocker_tree
+from ...kernels.shaft import ShaftAnswers, launch_shaft, patches_met
+from ...kernels.shields import Shields, device_shields
+from ...kernels.target import TargetAnswers, launch_target_search
+from .aim import AIM_ROUNDS, FIRST_TRIES, Sights, middles
 from .ledger import Ledger, apart, descend
-from .objects import ObjectRows, aim_at_objects
+from .search import segments
 
-# Sightlines aimed at each object that its box does not hide, then at those whose pieces are not hidden, round by round.
-FIRST_TRIES = 12
-AIM_ROUNDS = (32, 128, 512)
 # The root of the hierarchy is visible from everywhere: start where a level has some nodes.
 FIRST_LEVEL = 3
 # Lines tried for a node of the hierarchy, and for a piece.
 NODE_CAP, PIECE_CAP = 40, 2000
+# View cells and pieces are not halved below this, and a proof has at most so many pieces of a shaft.
+SMALLEST_M = (0.0625, 0.0625)
+SHAFT_CAP = 200
 # An object with so many pieces that could not be hidden is not looked at further: they are enough to aim at.
 OPEN_ENOUGH = 3
 
 
 @dataclass
-class Occlusion:
-    """What hides and what may be hidden, on the device.
+class OccluderModel:
+    """What hides and what may be hidden, on a device.
 
     Attributes:
+        sights: triangles and solids, and the view cells.
         occludees: objects and their pieces.
         tree: axial rectangles.
         shields: regions and patches.
-        triangles: opaque triangles.
-        targets: triangles of all objects.
-        ranges: first and past-the-last triangle of each object among the targets, shape (objects, 2).
-        solids: closed elements by view cell.
-        cells: view cells [grid steps], shape (cells, 2, 3), int32; they may overlap each other and solids.
         smallest: sides of view cells and of pieces that are not halved below this [grid steps].
-        cap: halvings a piece.
+        cap: halvings per piece.
     """
 
+    sights: Sights
     occludees: Occludees
     tree: BlockerTree
     shields: Shields
-    triangles: Triangles
-    targets: AimTargets
-    ranges: np.ndarray
-    solids: SolidIndex
-    cells: np.ndarray
     smallest: tuple[int, int]
-    cap: int
-    seed: int = 0
-    threads: int = 1
-    device: str = "cpu"
+    cap: int = SHAFT_CAP
 
+    @classmethod
+    def of(cls, sights: Sights, *, blockers: Blockers | None = None, shadows: bool = True) -> "OccluderModel":
+        """Copy a prepared model's occluders to the device.
 
-def device_occluders(
-    regions: Regions, patches: Patches, blockers: Blockers | None, device: str
-) -> tuple[BlockerTree, Shields]:
-    """Occluders as the two searches want them; blockers of a portal graph serve the search of lines only."""
-    boxes, axis, hierarchy = regions.boxes, regions.axis[regions.region], regions.hierarchy
-    if blockers is not None:
-        boxes, axis = np.concatenate([blockers.boxes, boxes]), np.concatenate([blockers.axis, axis])
-        hierarchy = build_hierarchy(boxes)
-    return blocker_tree(Blockers(boxes, axis, hierarchy), device), device_shields(regions, patches, device)
+        Args:
+            sights: of the model.
+            blockers: of its portal graph, if they are to hide too; they serve the search of lines only.
+            shadows: whether regions and patches are to hide.
+        """
+        model, device = sights.model, sights.device
+        regions, patches = (model.regions, model.patches) if shadows else (no_regions(), no_patches())
+        axial = regions.blockers
+        if blockers is not None:
+            boxes, axis = np.concatenate([blockers.boxes, axial.boxes]), np.concatenate([blockers.axis, axial.axis])
+            axial = Blockers(boxes, axis, build_hierarchy(boxes))
+        smallest = tuple(round(size / model.scene.grid_m) for size in SMALLEST_M)
+        shields = device_shields(regions, patches, device)
+        return cls(sights, model.occludees, blocker_tree(axial, device), shields, smallest)
+
+    @property
+    def cells(self) -> np.ndarray:
+        """View cells [grid steps], shape (cells, 2, 3), int32."""
+        return self.sights.cells
+
+    def from_cells(self, cells: np.ndarray) -> "OccluderModel":
+        """The same for other view cells."""
+        return replace(self, sights=self.sights.from_cells(cells))
 
 
 def seen_objects(
-    model: Occlusion, block: np.ndarray, aim_rounds: tuple[int, ...] = AIM_ROUNDS, ledger: Ledger | None = None
-) -> tuple[ObjectRows, Proofs | None]:
+    model: OccluderModel, block: np.ndarray, aim_rounds: tuple[int, ...] = AIM_ROUNDS, ledger: Ledger | None = None
+) -> tuple[Rows, Proofs | None]:
     """Every object that is not proved hidden from some view cells.
 
     Args:
@@ -93,68 +101,60 @@ def seen_objects(
         ledger: where to enter certificates; then only what has one is hidden.
 
     Returns:
-        Reached pairs. A pair that is left out is hidden from every point of the cell outside solids, exactly. A `seen`
-        pair's witness ends on the object, starts outside every solid, and clears all opaque triangles but the object's.
+        Reached pairs, ordered. A pair that is left out is hidden from every point of the cell outside solids, exactly.
         And the certificates, with a ledger.
     """
-    occludees = model.occludees
-    hide = partial(_hide_nodes, model, ledger)
-    source, target = descend(model.cells, block, occludees.levels, occludees.objects, FIRST_LEVEL, hide)
-    rows = ObjectRows.unseen(source, target)
+    occludees, hide = model.occludees, partial(_hide_nodes, model, ledger)
+    rows = Rows.unseen(*descend(model.cells, block, occludees.levels, occludees.objects, FIRST_LEVEL, hide))
     look_at_objects(model, rows, ())
     return refine_objects(model, rows, aim_rounds, ledger)
 
 
 def refine_objects(
-    model: Occlusion, rows: ObjectRows, aim_rounds: tuple[int, ...] = AIM_ROUNDS, ledger: Ledger | None = None
-) -> tuple[ObjectRows, Proofs | None]:
+    model: OccluderModel, rows: Rows, aim_rounds: tuple[int, ...] = AIM_ROUNDS, ledger: Ledger | None = None
+) -> tuple[Rows, Proofs | None]:
     """Hide, or find witnesses of, pairs that have neither; seen pairs stay as they are. As `seen_objects`."""
     pairs, pieces, hints = _prove_pieces(model, rows, ledger)
-    potential = rows.seen.copy()
+    potential = rows.seen
     potential[pairs] = True
     for number, tries in enumerate(aim_rounds):
         todo = np.flatnonzero(~rows.seen[pairs])
         boxes = model.occludees.pieces[pieces[todo]]
-        aim_at_objects(
-            model, model.cells, model.ranges, rows, pairs[todo], boxes, hints[todo], pieces[todo], tries, number + 1
-        )
-    kept = np.flatnonzero(potential)
-    proofs = None if ledger is None else ledger.close(~potential)
-    return ObjectRows(rows.source[kept], rows.target[kept], rows.seen[kept], rows.origin[kept], rows.end[kept]), proofs
+        model.sights.aim(rows, pairs[todo], boxes, hints[todo], pieces[todo], tries, number + 1)
+    return rows.take(potential), None if ledger is None else ledger.close(~potential)
 
 
-def look_at_objects(model: Occlusion, rows: ObjectRows, aim_rounds: tuple[int, ...] = AIM_ROUNDS) -> None:
-    """Shoot at the objects of rows, then at the pieces of those not seen; fills seen, origin and end in place."""
-    bounds = model.occludees.bounds[rows.target]
-    middles = np.stack([model.cells[rows.source].mean(axis=1), bounds.mean(axis=1)], axis=1)
-    everything = np.arange(len(rows.source))
-    aim_at_objects(model, model.cells, model.ranges, rows, everything, bounds, middles, rows.target, FIRST_TRIES, 0)
+def look_at_objects(model: OccluderModel, rows: Rows, aim_rounds: tuple[int, ...] = AIM_ROUNDS) -> None:
+    """Shoot at the objects of rows, then at the pieces of those not seen; shows what is hit, in place."""
+    bounds, cells = model.occludees.bounds[rows.target], model.cells[rows.source]
+    model.sights.aim(rows, np.arange(len(rows)), bounds, middles(cells, bounds), rows.target, FIRST_TRIES, 0)
     starts = model.occludees.starts
     for number, tries in enumerate(aim_rounds):
         todo = np.flatnonzero(~rows.seen)
-        sizes = np.minimum(starts[rows.target[todo] + 1] - starts[rows.target[todo]], OPEN_ENOUGH)
-        pairs = np.repeat(todo, sizes)
-        piece = np.arange(len(pairs)) - np.repeat(np.cumsum(sizes) - sizes - starts[rows.target[todo]], sizes)
+        first, last = starts[rows.target[todo]], starts[rows.target[todo] + 1]
+        sizes = np.minimum(last - first, OPEN_ENOUGH)
+        pairs, piece = np.repeat(todo, sizes), places_of(first, sizes)
         boxes = model.occludees.pieces[piece]
-        lines = np.stack([model.cells[rows.source[pairs]].mean(axis=1), boxes.mean(axis=1)], axis=1)
-        aim_at_objects(model, model.cells, model.ranges, rows, pairs, boxes, lines, piece, tries, number + 1)
+        model.sights.aim(rows, pairs, boxes, middles(cells[pairs], boxes), piece, tries, number + 1)
 
 
-def hidden_boxes(model: Occlusion, source: np.ndarray, boxes: np.ndarray, ledger: Ledger | None = None) -> np.ndarray:
+def hidden_boxes(
+    model: OccluderModel, source: np.ndarray, boxes: np.ndarray, ledger: Ledger | None = None
+) -> np.ndarray:
     """Boxes that no sightline from the view cell of their row reaches, shape (n,), bool; false proves nothing."""
     hidden = np.zeros(len(source), bool)
     rows = apart(model.cells[source], boxes)
-    hidden[rows] = _shaft(model, source[rows], boxes[rows], ledger).verdict == 0
+    hidden[rows] = _shaft(model, source[rows], boxes[rows], ledger).verdict == Verdict.HIDDEN
     return hidden
 
 
-def _hide_nodes(model: Occlusion, ledger: Ledger | None, source: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+def _hide_nodes(model: OccluderModel, ledger: Ledger | None, source: np.ndarray, boxes: np.ndarray) -> np.ndarray:
     """Which nodes of the hierarchy few lines hide, shape (n,), bool."""
-    return _search(model, source, boxes, NODE_CAP, ledger).verdict == 0
+    return _search(model, source, boxes, NODE_CAP, ledger).verdict == Verdict.HIDDEN
 
 
 def _search(
-    model: Occlusion,
+    model: OccluderModel,
     source: np.ndarray,
     boxes: np.ndarray,
     cap: int,
@@ -163,16 +163,15 @@ def _search(
 ) -> TargetAnswers:
     """Target search from view cells to boxes, row by row; `pair` as of `Ledger.add_lines`."""
     rows = np.column_stack([source, len(model.cells) + np.arange(len(boxes)), np.ones(len(boxes), int)])
-    everything = np.concatenate([model.cells, boxes])
-    options = {"threads": model.threads, "device": model.device}
-    answers = launch_target_search(model.tree, everything, rows, cap=cap, **options)
+    everything, device = np.concatenate([model.cells, boxes]), model.sights.device
+    answers = launch_target_search(model.tree, everything, rows, cap=cap, device=device)
     if ledger is not None:
-        ledger.add_lines(model.tree, everything, rows, answers, pair, **options)
+        ledger.add_lines(model.tree, everything, rows, answers, device, pair)
     return answers
 
 
 def _shaft(
-    model: Occlusion,
+    model: OccluderModel,
     source: np.ndarray,
     boxes: np.ndarray,
     ledger: Ledger | None = None,
@@ -181,16 +180,14 @@ def _shaft(
     """Shaft test from view cells to boxes, row by row."""
     rows = np.column_stack([source, len(model.cells) + np.arange(len(boxes))])
     everything = np.concatenate([model.cells, boxes])
-    options = {"certify": ledger is not None, "threads": model.threads, "device": model.device}
-    answers = launch_shaft(model.shields, everything, rows, smallest=model.smallest, cap=model.cap, **options)
+    options = {"smallest": model.smallest, "cap": model.cap, "certify": ledger is not None}
+    answers = launch_shaft(model.shields, everything, rows, **options, device=model.sights.device)
     if ledger is not None:
         ledger.add_shafts(source, boxes, answers, pair)
     return answers
 
 
-def _prove_pieces(
-    model: Occlusion, rows: ObjectRows, ledger: Ledger | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _prove_pieces(model: OccluderModel, rows: Rows, ledger: Ledger | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Try to hide the pieces of the pairs that are not seen, a few at a time, until some of a pair are not hidden.
 
     Returns:
@@ -199,45 +196,37 @@ def _prove_pieces(
     starts = model.occludees.starts
     pairs = np.flatnonzero(~rows.seen)
     first, last = starts[rows.target[pairs]], starts[rows.target[pairs] + 1]
-    open_pieces = np.zeros(len(pairs), int)
-    found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    left_of = np.zeros(len(pairs), int)
+    found = [(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2, 3)))]
     step = 1
-    while True:
-        active = np.flatnonzero((first < last) & (open_pieces < OPEN_ENOUGH))
-        if not len(active):
-            break
+    while len(active := np.flatnonzero((first < last) & (left_of < OPEN_ENOUGH))):
         sizes = np.minimum(step, last[active] - first[active])
-        at = np.repeat(active, sizes)
-        ends = np.cumsum(sizes)
-        piece = first[at] + np.arange(len(at)) - np.repeat(ends - sizes, sizes)
+        at, piece = np.repeat(active, sizes), places_of(first[active], sizes)
         left, hints = _prove_boxes(model, rows.source[pairs[at]], model.occludees.pieces[piece], ledger, pairs[at])
         found.append((pairs[at[left]], piece[left], hints[left]))
-        np.add.at(open_pieces, at[left], 1)
+        np.add.at(left_of, at[left], 1)
         first[active] += sizes
         step *= 2
-    if not found:
-        return np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2, 3))
     return tuple(np.concatenate(column) for column in zip(*found, strict=True))
 
 
 def _prove_boxes(
-    model: Occlusion, source: np.ndarray, boxes: np.ndarray, ledger: Ledger | None, pair: np.ndarray
+    model: OccluderModel, source: np.ndarray, boxes: np.ndarray, ledger: Ledger | None, pair: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which boxes could not be hidden from the view cell of their row, bool, and a line to each, shape (n, 2, 3)."""
-    hints = np.stack([model.cells[source].mean(axis=1), boxes.mean(axis=1)], axis=1)
+    hints = middles(model.cells[source], boxes)
     left = np.ones(len(source), bool)
     rows = apart(model.cells[source], boxes)
     answers = _search(model, source[rows], boxes[rows], PIECE_CAP, ledger, pair[rows])
-    left[rows[answers.verdict == 0]] = False
-    lined = np.flatnonzero(answers.verdict == 1)
+    left[rows[answers.verdict == Verdict.HIDDEN]] = False
+    lined = np.flatnonzero(answers.verdict == Verdict.VISIBLE)
     at = rows[lined]
     hints[at] = np.stack(segments(answers, lined, model.cells[source[at]], boxes[at]), axis=1)
     # A line past all rectangles that meets no oblique occluder either: there is nothing to prove.
-    at = rows[answers.verdict != 0]
-    options = {"threads": model.threads, "device": model.device}
-    at = at[patches_met(model.shields, hints[at, 0], hints[at, 1], **options)]
+    at = rows[answers.verdict != Verdict.HIDDEN]
+    at = at[patches_met(model.shields, hints[at, 0], hints[at, 1], device=model.sights.device)]
     proofs = _shaft(model, source[at], boxes[at], ledger, pair[at])
-    left[at[proofs.verdict == 0]] = False
-    failed = proofs.verdict != 0
-    hints[at[failed]] = proofs.middle[failed]
+    hidden = proofs.verdict == Verdict.HIDDEN
+    left[at[hidden]] = False
+    hints[at[~hidden]] = proofs.middle[~hidden]
     return left, hints

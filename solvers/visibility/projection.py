@@ -18,10 +18,16 @@ import numpy as np
 
 from ...data.errors import InputError
 from ...data.patches import Patches
+from ...data.ragged import starts_of
 from ...data.scene import GRID_LIMIT
+from ...data.verdict import Verdict
 from ...kernels.coverage import check_resolution, launch_coverage
+from ...kernels.launch import CPU, Device
 from ...kernels.occludee import launch_occludees
-from ...kernels.shadow import USABLE, Umbras, launch_shrink, launch_umbra
+from ...kernels.shrink import launch_shrink
+from ...kernels.umbra import USABLE, Umbras, launch_umbra
+from ..projection_point import cluster_problems, solve_points
+from ..result import Status
 
 CLUSTERS = (1, 6, 14, 26)
 OBJECTIVES = ("centre", "random", "socp", "lp")
@@ -89,37 +95,6 @@ class VlodStats:
         self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
 
-def rectangle_outlines(boxes: np.ndarray) -> Patches:
-    """Flat axial boxes (data/regions.py) as outlines, shape (n, 2, 3), int32."""
-    count = len(boxes)
-    axis = (boxes[:, 1] == boxes[:, 0]).argmax(axis=1)
-    u, v = ((axis + step) % 3 for step in (1, 2))
-    rows = np.arange(count)
-    corners = np.repeat(boxes[:, :1], 4, axis=1)
-    for corner, (at_u, at_v) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
-        corners[rows, corner, u] = boxes[rows, at_u, u]
-        corners[rows, corner, v] = boxes[rows, at_v, v]
-    normal = np.zeros((count, 3))
-    normal[rows, axis] = 1
-    size = (boxes[:, 1] - boxes[:, 0]).astype(float)
-    return Patches(
-        corners.reshape(-1, 3).astype(np.int32),
-        np.arange(0, 4 * count + 1, 4, dtype=np.int64),
-        boxes.astype(np.int32),
-        normal,
-        np.repeat(boxes[rows, 0, axis].astype(float)[:, None], 2, axis=1),
-        np.full(count, -1, np.int32),
-        size[rows, u] * size[rows, v],
-    )
-
-
-def join_outlines(first: Patches, second: Patches) -> Patches:
-    """Both sets of outlines as one."""
-    names = ("corners", "boxes", "normal", "depth", "owner", "area")
-    joined = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
-    return Patches(starts=np.concatenate([first.starts, first.starts[-1] + second.starts[1:]]), **joined)
-
-
 def cluster_directions(count: int) -> np.ndarray:
     """Unit directions of so many clusters, shape (count, 3)."""
     grid = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -138,8 +113,7 @@ def vlod_hidden(
     *,
     objects: int | None = None,
     points: PointChooser | None = None,
-    threads: int = 1,
-    device: str = "cpu",
+    device: Device = CPU,
 ) -> tuple[np.ndarray, VlodStats]:
     """Objects that are hidden from all of a view cell.
 
@@ -152,8 +126,7 @@ def vlod_hidden(
         objects: how many there are; by default one more than the last owner.
         points: chooses projection points instead of `settings.objective`, to compare solvers: from the clusters'
             programmes to points, shape (clusters, 3); any point in front of all occluders of its cluster is safe.
-        threads: CPU threads.
-        device: Warp device.
+        device: where to.
 
     Returns:
         Shape (m, objects), bool: true is never wrong, false may be. An object without parts is hidden. And what was
@@ -169,7 +142,7 @@ def vlod_hidden(
         raise InputError(f"cells, parts, owners: expected shapes (m, 2, 3), (p, 2, 3), (p,), found {found}")
     if len(owners) and not 0 <= owners.min() <= owners.max() < objects:
         raise InputError(f"owners: expected objects 0 to {objects - 1}, found {owners.min()} to {owners.max()}")
-    method = _Method(occluders, parts.astype(np.int32), settings, VlodStats(), threads, device, points)
+    method = _Method(occluders, parts.astype(np.int32), settings, VlodStats(), device, points)
     hidden = np.ones((len(cells), objects), bool)
     split = [split_cell(cell, settings.split) for cell in cells]
     block = max(1, BLOCK // settings.split**3)
@@ -201,16 +174,10 @@ class ShrunkOccluders:
 
 
 def shrunk_occluders(
-    cell: np.ndarray,
-    occluders: Patches,
-    parts: np.ndarray,
-    settings: VlodSettings,
-    *,
-    threads: int = 1,
-    device: str = "cpu",
+    cell: np.ndarray, occluders: Patches, parts: np.ndarray, settings: VlodSettings, *, device: Device = CPU
 ) -> ShrunkOccluders:
     """Projection points and shrunk occluders of a view cell, to look at; arguments as of `vlod_hidden`."""
-    method = _Method(occluders, np.asarray(parts, np.int32), settings, VlodStats(), threads, device)
+    method = _Method(occluders, np.asarray(parts, np.int32), settings, VlodStats(), device)
     view = method.prepare(np.asarray(cell)[None])[0]
     return method.shrink(view, None)
 
@@ -229,9 +196,7 @@ def culling_scores(
         weights: of the parts, such as their triangles, shape (p,).
         settings: of the method; the objective plays no part.
     """
-    method = _Method(
-        occluders, np.asarray(parts, np.int32), replace(settings, objective="centre"), VlodStats(), 1, "cpu"
-    )
+    method = _Method(occluders, np.asarray(parts, np.int32), replace(settings, objective="centre"), VlodStats())
     view = method.prepare(np.asarray(cell)[None])[0]
     everything = np.arange(len(parts))
 
@@ -278,8 +243,7 @@ class _Method:
     parts: np.ndarray
     settings: VlodSettings
     stats: VlodStats
-    threads: int
-    device: str
+    device: Device = CPU
     choose: PointChooser | None = None
 
     def prepare(self, cells: np.ndarray) -> list[_View]:
@@ -289,7 +253,7 @@ class _Method:
             cell_of = np.repeat(np.arange(len(cells)), [len(c) for c in chosen])
             occluder = np.concatenate(chosen)
             pairs = np.column_stack([cell_of, occluder])
-            umbras = launch_umbra(cells, self.occluders, pairs, threads=self.threads, device=self.device)
+            umbras = launch_umbra(cells, self.occluders, pairs, device=self.device)
             self.stats.occluders += int((umbras.status == USABLE).sum())
         with self.stats.phase("solve"):
             cluster = self._cluster(cells[cell_of], occluder)
@@ -336,10 +300,6 @@ class _Method:
             seeds = [[self.settings.seed, *(cell.astype(np.int64) + GRID_LIMIT).ravel()] for cell in cells]
             share = np.stack([np.random.default_rng(seed).random(shape[1:]) for seed in seeds])
             return cells[:, None, 0] + share * (cells[:, None, 1] - cells[:, None, 0])
-        # Imported late: it takes seconds, and builds on kernels/shadow.py.
-        from ..projection_point import cluster_problems, solve_points
-        from ..result import Status
-
         size = self.parts.max(axis=(0, 1), initial=1).astype(float) - self.parts.min(axis=(0, 1), initial=0)
         objective = "lp" if self.settings.objective == "lp" else "socp"
         only = {"objective": objective, "depth": float(np.linalg.norm(size))}
@@ -364,28 +324,24 @@ class _Method:
 
     def shrink(self, view: _View, limits: np.ndarray | None) -> ShrunkOccluders:
         """What is left of a view cell's occluders, for occludees at most `limits` beyond each, or any."""
-        options = {"threads": self.threads, "device": self.device}
-        polygons = launch_shrink(view.umbras, view.rows, view.points[view.cluster], limits, **options)
+        polygons = launch_shrink(view.umbras, view.rows, view.points[view.cluster], limits, device=self.device)
         sizes = np.diff(polygons.starts)
-        starts = np.concatenate([[0], np.cumsum(sizes[sizes > 0])])
+        starts = starts_of(sizes[sizes > 0])
         return ShrunkOccluders(view.points, polygons.corners, starts, view.cluster[sizes > 0])
 
     def _covered(self, view: _View, limit: float, boxes: np.ndarray) -> np.ndarray:
         """Whether a cube map of some cluster covers each box, with occluders shrunk for a depth, shape (n,), bool."""
-        options = {"threads": self.threads, "device": self.device}
         with self.stats.phase("shrink"):
             limits = np.full(len(view.rows), limit) if self.settings.shells else None
             shrunk = self.shrink(view, limits)
             self.stats.drawn += len(shrunk.cluster)
         with self.stats.phase("coverage"):
-            resolution = self.settings.resolution
-            maps = launch_coverage(
-                view.points, shrunk.corners, shrunk.starts, shrunk.cluster, resolution=resolution, **options
-            )
+            options = {"resolution": self.settings.resolution, "device": self.device}
+            maps = launch_coverage(view.points, shrunk.corners, shrunk.starts, shrunk.cluster, **options)
         with self.stats.phase("occludees"):
             hidden = np.zeros(len(boxes), bool)
             for number in np.unique(shrunk.cluster):
                 rest = np.flatnonzero(~hidden)
                 rows = np.column_stack([rest, np.full(len(rest), number)])
-                hidden[rest] = launch_occludees(maps, boxes, rows, threads=self.threads) == 1
+                hidden[rest] = launch_occludees(maps, boxes, rows) == Verdict.HIDDEN
         return hidden

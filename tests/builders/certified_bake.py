@@ -6,9 +6,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import trimesh
 from viewcell.data.scene import GRID_M, Role
-from viewcell.data.store.database import load
 from viewcell.verify.proofs.line_tree import check_certificates
-from viewcell.workbench.bake.run import Settings, bake
+from viewcell.workbench.bake.run import bake
+from viewcell.workbench.bake.settings import Settings
+from viewcell.workbench.baked import load
 
 from builders import random_solids
 

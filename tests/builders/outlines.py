@@ -2,7 +2,7 @@
 
 import numpy as np
 from viewcell.data.patches import Patches, find_patches
-from viewcell.verify.exact.shadow import occluder
+from viewcell.verify.exact.umbra import occluder
 
 
 def surface(columns, rows, position):
@@ -77,3 +77,8 @@ def random_scene(rng):
 def area_of(corners):
     corners = np.asarray(corners, float)
     return np.linalg.norm(np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)) / 2
+
+
+def bent_quadrilateral(height):
+    triangles = surface(1, 1, lambda u, v: (u * 100, v * 100, height * u * v))
+    return find_patches(triangles, np.zeros(2), least_area=1.0, cos_limit=0.2, axial=True)

@@ -4,9 +4,9 @@ from fractions import Fraction
 from itertools import combinations
 
 import numpy as np
-from viewcell.kernels.shadow import launch_umbra
+from viewcell.kernels.umbra import launch_umbra
 from viewcell.solvers.projection_point import cluster_problems
-from viewcell.verify.exact.shadow import dot
+from viewcell.verify.arithmetic import dot
 
 from builders.outlines import outline_table, random_outline
 

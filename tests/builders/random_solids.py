@@ -2,12 +2,10 @@
 
 import numpy as np
 import trimesh
-from viewcell.data.opaque import opaque_planes
 from viewcell.data.patches import find_patches
-from viewcell.data.regions import find_regions
+from viewcell.data.prepared import PreparedModel
 from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
-from viewcell.kernels.shaft import device_shields
-from viewcell.solvers.visibility.engine import with_details
+from viewcell.kernels.shields import device_shields
 
 
 def scene_of_meshes(meshes, roles=None):
@@ -60,13 +58,7 @@ def random_solids(seed, axial=5, turned=3):
     return scene_of_meshes(meshes, roles)
 
 
-def shields_of(scene, axial=True, oblique=True):
-    triangles, owners = scene.triangles()
-    opaque = with_details(scene, opaque_planes(triangles[scene.object_mask(Role.OCCLUDER)[owners]]))
-    regions = find_regions(scene, opaque)
-    if not axial:
-        opaque.boxes[:] = [boxes[:0] for boxes in opaque.boxes]
-        regions = find_regions(scene, opaque, sections=False)
-    kept = triangles if oblique else triangles[:0]
-    patches = find_patches(kept, owners[: len(kept)], least_area=100.0)
+def shields_of(scene):
+    """Shields, regions and patches; patches however small."""
+    regions, patches = PreparedModel(scene).regions, find_patches(*scene.triangles(), least_area=100.0)
     return device_shields(regions, patches), regions, patches

@@ -8,7 +8,8 @@ import pytest
 from builders.outlines import random_disc, surface
 from viewcell.data.errors import InputError
 from viewcell.data.patches import area_vectors, find_patches
-from viewcell.verify.arithmetic import MISS, cross, crossing_kind, dot, minus
+from viewcell.verify.arithmetic import cross, dot, minus
+from viewcell.verify.exact.segment import MISS, crossing_kind
 
 
 def patches_of(triangles, owners=None, **options):

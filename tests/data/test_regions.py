@@ -4,17 +4,12 @@ import numpy as np
 import pytest
 from builders import random_solids
 from viewcell.data.graph import OTHER_AXES
-from viewcell.data.opaque import opaque_planes
-from viewcell.data.regions import find_regions
-from viewcell.data.scene import Role
+from viewcell.data.prepared import PreparedModel
 from viewcell.data.solids import winding_numbers
-from viewcell.solvers.visibility.engine import with_details
 
 
 def regions_of(scene):
-    triangles, owners = scene.triangles()
-    opaque = opaque_planes(triangles[scene.object_mask(Role.OCCLUDER)[owners]])
-    return find_regions(scene, with_details(scene, opaque))
+    return PreparedModel(scene).regions
 
 
 def covered_cells(regions, region):

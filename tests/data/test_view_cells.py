@@ -6,8 +6,9 @@ import pyarrow.parquet as pq
 import pytest
 from builders import random_solids
 from viewcell.data.errors import InputError
-from viewcell.data.opaque import opaque_planes
-from viewcell.data.view_cells import octants, octree_roots, read_view_cells, walkable
+from viewcell.data.prepared import PreparedModel
+from viewcell.data.store.view_cells import read_view_cells
+from viewcell.data.view_cells import octants, octree_roots, walkable
 
 HEAD = "min_x,min_y,min_z,max_x,max_y,max_z"
 
@@ -96,8 +97,6 @@ def test_octree_covers_the_model_and_its_octants_tile_it(room):
 
 
 def test_walkable_cells_have_a_floor_and_air(room):
-    triangles, _ = room.triangles()
-    opaque = opaque_planes(triangles)
     cells = np.array(
         [
             [[2048, 2048, 512], [3072, 3072, 1536]],
@@ -108,7 +107,7 @@ def test_walkable_cells_have_a_floor_and_air(room):
         np.int32,
     )
     # Over the floor; too high above it; beside the building; inside a wall.
-    assert walkable(cells, room, opaque).tolist() == [True, False, False, False]
+    assert walkable(cells, PreparedModel(room)).tolist() == [True, False, False, False]
 
 
 @pytest.mark.parametrize("size", [0.0, -1.0, np.nan, 1e-3])

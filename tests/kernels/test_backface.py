@@ -8,9 +8,15 @@ from hypothesis import strategies as st
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.scene import Definition, Instance, Mesh, Role, Scene
+from viewcell.data.solids import closed_elements
 from viewcell.kernels.backface import LEAF_SIZE, build_cones, integer_normals, launch_backface
+from viewcell.kernels.launch import Device
 from viewcell.verify.exact.backface import back_facing, outward_triangles
 from viewcell.verify.rays.embree import embree_scene
+
+
+def cones_of(scene):
+    return build_cones(closed_elements(scene), scene.triangle_counts)
 
 
 def scene_of(*meshes, role=Role.DETAIL):
@@ -44,7 +50,7 @@ def reference(scene, box):
 def removed(scene, boxes, **options):
     """Counts of all objects for every box, shape (boxes, objects)."""
     rows = np.stack(np.meshgrid(np.arange(len(boxes)), np.arange(len(scene.objects)), indexing="ij"), axis=-1)
-    counts, _ = launch_backface(build_cones(scene), np.asarray(boxes), rows.reshape(-1, 2), **options)
+    counts, _ = launch_backface(cones_of(scene), np.asarray(boxes), rows.reshape(-1, 2), **options)
     return counts.reshape(len(boxes), -1)
 
 
@@ -97,7 +103,7 @@ def test_planes_that_pass_a_corner_within_a_step(seed):
     side = rng.integers(0, 2, (40, 3))
     boxes = np.stack([points - side * size, points + (1 - side) * size], axis=1)
     rows = np.column_stack([np.arange(40)] * 2)
-    counts, _ = launch_backface(build_cones(scene), boxes, rows)
+    counts, _ = launch_backface(cones_of(scene), boxes, rows)
     triangles, _ = scene.triangles()
     assert counts.tolist() == [sum(back_facing(triangles[4 * k : 4 * k + 4], box)) for k, box in enumerate(boxes)]
     assert outward_triangles(triangles[:4]) == [True] * 4
@@ -123,14 +129,14 @@ def test_only_closed_shells_turned_outwards_are_culled():
 def test_a_cell_inside_an_object_is_told():
     scene = scene_of(box_mesh((-100, -100, -100), (100, 100, 100)))
     cells = np.array([[[-9, -9, -9], [9, 9, 9]], [[-9, -9, -9], [9, 9, 101]]])
-    counts, whole = launch_backface(build_cones(scene), cells, np.array([[0, 0], [1, 0]]))
+    counts, whole = launch_backface(cones_of(scene), cells, np.array([[0, 0], [1, 0]]))
     assert counts.tolist() == [12, 10]
     assert whole.tolist() == [True, False]
 
 
 def test_hierarchies_hold_what_they_should():
     scene = make_office(floors=1, rooms_per_side=2, seed=2)
-    cones = build_cones(scene)
+    cones = cones_of(scene)
     normals = integer_normals(cones.triangles).astype(float)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     narrow = 0
@@ -174,14 +180,14 @@ def test_no_ray_from_outside_meets_a_removed_triangle_first():
 def test_threads_change_nothing():
     scene = scene_of(icosphere(3000), box_mesh((0, 0, 4000), (900, 900, 5000)))
     boxes = random_boxes(np.random.default_rng(7), np.array([[-6000] * 3, [6000] * 3]), 3000, 2000)
-    np.testing.assert_array_equal(removed(scene, boxes), removed(scene, boxes, threads=2))
+    np.testing.assert_array_equal(removed(scene, boxes), removed(scene, boxes, device=Device(threads=2)))
 
 
 def test_a_scene_without_closed_objects():
     vertices, faces = box_mesh((0, 0, 0), (9, 9, 9))
     scene = scene_of((vertices, faces[1:]))
     assert removed(scene, [[[20, 0, 0], [30, 9, 9]]]).tolist() == [[0]]
-    assert len(build_cones(Scene([], [])).roots) == 0
+    assert len(cones_of(Scene([], [])).roots) == 0
 
 
 @pytest.mark.parametrize(
@@ -195,4 +201,4 @@ def test_a_scene_without_closed_objects():
 )
 def test_bad_rows_are_refused(boxes, rows, message):
     with pytest.raises(InputError, match=message):
-        launch_backface(build_cones(scene_of(box_mesh((0, 0, 0), (9, 9, 9)))), boxes, rows)
+        launch_backface(cones_of(scene_of(box_mesh((0, 0, 0), (9, 9, 9)))), boxes, rows)

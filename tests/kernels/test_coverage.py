@@ -7,9 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.errors import InputError
+from viewcell.data.verdict import Verdict
 from viewcell.kernels.coverage import launch_coverage
+from viewcell.kernels.launch import Device
 from viewcell.kernels.occludee import launch_occludees
-from viewcell.verify.exact.coverage import cover_polygon, covers_box, touched_pixels
+from viewcell.verify.exact.coverage import cover_polygon
+from viewcell.verify.exact.occludee import covers_box, touched_pixels
 
 SIZE = 8
 
@@ -45,7 +48,7 @@ def coverage(viewpoint, polygons, owners=None, **options):
 
 
 def covered(maps, box):
-    return bool(launch_occludees(maps, np.array([box]), np.array([[0, 0]]))[0])
+    return launch_occludees(maps, np.array([box]), np.array([[0, 0]]))[0] == Verdict.HIDDEN
 
 
 def compare(viewpoint, polygon):
@@ -180,11 +183,11 @@ def test_hidden_boxes_are_hidden_exactly(seed):
     maps = coverage(viewpoint, polygons, resolution=4)
     low = rng.integers(-6000, 6000, (400, 3))
     boxes = np.stack([low, low + rng.integers(0, 2500, (400, 3))], axis=1)
-    hidden = launch_occludees(maps, boxes, np.column_stack([np.arange(400), np.zeros(400, int)]))
+    verdicts = launch_occludees(maps, boxes, np.column_stack([np.arange(400), np.zeros(400, int)]))
     # As many of each kind; the exact answer takes long.
-    chosen = np.concatenate([np.flatnonzero(hidden == verdict)[:3] for verdict in (0, 1)])
-    for box, verdict in zip(boxes[chosen], hidden[chosen], strict=True):
-        assert bool(verdict) == covers_box(viewpoint, polygons, box, 4), box.tolist()
+    chosen = np.concatenate([np.flatnonzero(verdicts == verdict)[:3] for verdict in (Verdict.UNKNOWN, Verdict.HIDDEN)])
+    for box, verdict in zip(boxes[chosen], verdicts[chosen], strict=True):
+        assert (verdict == Verdict.HIDDEN) == covers_box(viewpoint, polygons, box, 4), box.tolist()
 
 
 def test_touched_pixels_hold_every_point_of_the_box():
@@ -241,7 +244,7 @@ def test_points_of_hidden_boxes_lie_behind_a_polygon():
     maps = coverage(viewpoint, polygons, resolution=256)
     low = rng.integers(-9000, 9000, (3000, 3))
     boxes = np.stack([low, low + rng.integers(1, 1500, (3000, 3))], axis=1)
-    hidden = launch_occludees(maps, boxes, np.column_stack([np.arange(3000), np.zeros(3000, int)])) == 1
+    hidden = launch_occludees(maps, boxes, np.column_stack([np.arange(3000), np.zeros(3000, int)])) == Verdict.HIDDEN
     assert 300 < hidden.sum() < 2900
     boxes = boxes[hidden]
     for points in rng.uniform(boxes[:, 0], boxes[:, 1], (20, len(boxes), 3)):
@@ -252,7 +255,9 @@ def test_batches_and_threads_change_nothing():
     rng = np.random.default_rng(3)
     viewpoints, polygons = rng.uniform(-150, 150, (5, 3)), random_polygons(rng, 60)
     owners = rng.integers(0, 4, 60)
-    one, two = (coverage(viewpoints, polygons, owners, resolution=512, threads=threads) for threads in (1, 2))
+    one, two = (
+        coverage(viewpoints, polygons, owners, resolution=512, device=Device(threads=threads)) for threads in (1, 2)
+    )
     for index in range(5):
         mine = [polygon for polygon, owner in zip(polygons, owners, strict=True) if owner == index]
         alone = coverage(viewpoints[index], mine, resolution=512).depth(0)
@@ -263,9 +268,9 @@ def test_batches_and_threads_change_nothing():
     boxes = np.stack([low, low + rng.integers(1, 800, (2000, 3))], axis=1)
     rows = np.column_stack([np.arange(2000), rng.integers(0, 5, 2000)])
     answers = launch_occludees(one, boxes, rows)
-    np.testing.assert_array_equal(answers, launch_occludees(two, boxes, rows, threads=2))
-    assert 50 < answers.sum() < 1950
-    assert not answers[rows[:, 1] == 4].any()
+    np.testing.assert_array_equal(answers, launch_occludees(two, boxes, rows))
+    assert 50 < (answers == Verdict.HIDDEN).sum() < 1950
+    assert (answers[rows[:, 1] == 4] == Verdict.UNKNOWN).all()
 
 
 TRIANGLE = np.array([[900.0, 0, 0], [900, 500, 0], [900, 0, 500]])

@@ -15,7 +15,8 @@ MODULES = (
     "occludee",
     "backface",
     "select",
-    "shadow",
+    "umbra",
+    "shrink",
     "raster",
     "deviation",
 )

@@ -9,6 +9,7 @@ from scipy.spatial import Delaunay
 from viewcell.data.errors import InputError
 from viewcell.kernels import deviation
 from viewcell.kernels.deviation import launch_deviation
+from viewcell.kernels.launch import Device
 from viewcell.verify.exact.deviation import deviation_squared, squared_distance
 
 RELATIVE, ABSOLUTE = 0.01, 2.0**-15
@@ -113,7 +114,7 @@ def test_no_sampled_point_is_farther_than_the_bound(seed):
 def test_threads_do_not_change_the_answer():
     ball, ring = trimesh.creation.icosphere(subdivisions=3), trimesh.creation.torus(1.0, 0.3)
     a, b = (np.array(x.vertices)[x.faces] for x in (ball, ring))
-    once, again = (launch_deviation(a, b, threads=n) for n in (1, 3))
+    once, again = (launch_deviation(a, b, device=Device(threads=n)) for n in (1, 3))
     assert (once.lower == again.lower).all() and (once.upper == again.upper).all()
 
 

@@ -1,23 +1,23 @@
 """Portal-sequence flood and target search against an exact search in plain Python, on random and shared graphs."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from builders import random_buildings
 from builders.places import SHARED
 from viewcell.data.graph import OTHER_AXES
 from viewcell.data.store.graph_folder import read_graph
+from viewcell.data.verdict import Verdict
 from viewcell.kernels import flood
 from viewcell.kernels.flood import launch_flood
+from viewcell.kernels.launch import Device
 from viewcell.kernels.target import TargetAnswers, launch_target_search
-from viewcell.solvers.visibility import engine as engines
-from viewcell.solvers.visibility.cells import accept, join_rows, segments
-from viewcell.solvers.visibility.engine import Engine
+from viewcell.solvers.visibility import graph_engine
+from viewcell.solvers.visibility.cells import accept, join_cell_rows
+from viewcell.solvers.visibility.graph_engine import GraphEngine
+from viewcell.solvers.visibility.search import segments
 from viewcell.verify.exact.sightline import Sight, Sightlines
 
 GRAPHS = SHARED / "graphs"
-HIDDEN, VISIBLE, UNKNOWN = range(3)
 CAP = 1_000_000
 
 
@@ -28,7 +28,7 @@ def shared_graph(name):
 
 
 def model_of(graph):
-    return Engine(None, graph, None, seed=0, threads=1, device="cpu").model
+    return GraphEngine(graph).model
 
 
 def flooded(model, sources=None, **options):
@@ -62,11 +62,12 @@ def check_pairs(model, truth, sources=None, walls=None):
     assert found.complete.all() and not found.undecided.any()
     np.testing.assert_array_equal(reached, truth, "flood")
     rows, answers = searched(model, sources)
-    assert (answers.verdict != UNKNOWN).all()
+    assert (answers.verdict != Verdict.UNKNOWN).all()
     index = np.full(model.graph.cell_count, -1)
     index[sources] = np.arange(len(sources))
-    np.testing.assert_array_equal(answers.verdict == VISIBLE, truth[index[rows[:, 0]], rows[:, 1]], "target search")
-    seen = np.flatnonzero(answers.verdict == VISIBLE)
+    visible = answers.verdict == Verdict.VISIBLE
+    np.testing.assert_array_equal(visible, truth[index[rows[:, 0]], rows[:, 1]], "target search")
+    seen = np.flatnonzero(visible)
     others = np.flatnonzero(found.pairs[:, 1] != sources[found.pairs[:, 0]])
     lines = TargetAnswers(None, None, found.pairs[:, 2], found.line, found.offset)
     pairs = np.column_stack([sources[found.pairs[:, 0]], found.pairs[:, 1]])[others]
@@ -130,7 +131,7 @@ def test_shared_building():
 )
 def test_published_means(name, mean):
     graph = shared_graph(name)
-    engine = Engine(None, graph, None, seed=0, threads=2, device="cpu")
+    engine = GraphEngine(graph, device=Device(threads=2))
     rows = engine.join([engine.visible(np.arange(graph.cell_count))])[0]
     assert round(len(rows.source) / graph.cell_count, 2) == mean
     assert rows.seen.mean() > 0.999
@@ -147,10 +148,10 @@ def test_a_search_that_is_cut_off_claims_nothing():
     assert (reached <= truth).all()
     np.testing.assert_array_equal(reached[found.complete], truth[found.complete])
     rows, answers = searched(model, cap=1)
-    assert (answers.verdict == UNKNOWN).any()
+    assert (answers.verdict == Verdict.UNKNOWN).any()
     visible = truth[rows[:, 0], rows[:, 1]]
-    assert not (visible & (answers.verdict == HIDDEN)).any(), "wrong-hidden"
-    assert not (~visible & (answers.verdict == VISIBLE)).any(), "wrong-visible"
+    assert not (visible & (answers.verdict == Verdict.HIDDEN)).any(), "wrong-hidden"
+    assert not (~visible & (answers.verdict == Verdict.VISIBLE)).any(), "wrong-visible"
 
 
 @pytest.mark.parametrize("cap", [1, 20, 100_000])
@@ -158,12 +159,17 @@ def test_rows_do_not_depend_on_the_cap(cap, monkeypatch):
     graph = shared_graph("w48")
 
     def rows():
-        engine = Engine(None, graph, None, seed=0, threads=1, device="cpu")
+        engine = GraphEngine(graph)
         joined = engine.join([engine.visible(np.arange(graph.cell_count))])[0]
         return joined.source, joined.target, joined.seen
 
+    def capped(*args, **options):
+        return launch_flood(*args, **(options | {"cap": cap}))
+
     expected = rows()
-    monkeypatch.setattr(engines, "launch_flood", lambda *args, **kwargs: launch_flood(*args, **(kwargs | {"cap": cap})))
+    monkeypatch.setattr(
+        graph_engine, "launch_flood", lambda *args, **kwargs: launch_flood(*args, **(kwargs | {"cap": cap}))
+    )
     for got, wanted in zip(rows(), expected, strict=True):
         np.testing.assert_array_equal(got, wanted)
 
@@ -171,9 +177,9 @@ def test_rows_do_not_depend_on_the_cap(cap, monkeypatch):
 def test_threads_and_chunks_change_nothing(monkeypatch):
     model = model_of(shared_graph("w48"))
     _, one = flooded(model)
-    _, two = flooded(model, threads=2)
+    _, two = flooded(model, device=Device(threads=2))
     monkeypatch.setattr(flood, "CHUNK", 7)
-    _, chunked = flooded(model, threads=2)
+    _, chunked = flooded(model, device=Device(threads=2))
     for other in (two, chunked):
         for name in one.__dataclass_fields__:
             np.testing.assert_array_equal(getattr(other, name), getattr(one, name), err_msg=name)
@@ -182,16 +188,15 @@ def test_threads_and_chunks_change_nothing(monkeypatch):
 def test_joined_rows_are_symmetric():
     """What one side hides is hidden from the other too, and one witness serves both sides."""
     graph, _ = random_buildings.random_graph(0, walls=4)
-    engine = Engine(None, graph, None, seed=0, threads=1, device="cpu")
+    engine = GraphEngine(graph)
     part = engine.visible(np.arange(graph.cell_count)).cells
     pairs = np.column_stack([part.source, part.target])
     others = np.flatnonzero((part.source != part.target) & part.seen)
     hidden, unseen = pairs[others[0]].tolist(), pairs[others[-1]].tolist()
     row = int(others[-1])
-    part.seen[row] = False
+    part.verdict[row] = Verdict.UNKNOWN
     keep = ~(pairs == hidden).all(axis=1)
-    names = ("source", "target", "seen", "origin", "end", "portal_counts")
-    rows = join_rows(engine.model, [replace(part, **{name: getattr(part, name)[keep] for name in names})])
+    rows = join_cell_rows(engine.model, [part.take(keep)])
     joined = list(zip(rows.source.tolist(), rows.target.tolist(), strict=True))
     assert tuple(hidden) not in joined and tuple(hidden[::-1]) not in joined
     assert len(joined) == len(pairs) - 2

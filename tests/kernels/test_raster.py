@@ -7,12 +7,13 @@ from embreex.rtcore_scene import EmbreeScene
 from viewcell.data.buildings.office import make_office
 from viewcell.data.camera import NEAR_M, CameraPath, Screen, on_screen, project_boxes
 from viewcell.data.errors import InputError
+from viewcell.kernels.launch import CPU, Device
 from viewcell.kernels.raster import device_triangles, launch_raster
 from viewcell.verify.exact.raster import first_hit
 
 # Rays so near to an edge [pixels], or surfaces so near to each other (part of the depth), are left to rounding.
 CLEAR, LEAD = 1.0e-6, 1.0e-9
-DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)]
+DEVICES = [CPU, pytest.param(Device("cuda:0"), marks=pytest.mark.gpu)]
 
 
 def random_view(seed):
@@ -30,7 +31,7 @@ def random_triangles(rng, count=10):
     return np.concatenate([loose, fan, flat]).astype(np.int32)
 
 
-def draw(triangles, owners, eyes, axes, screen, device="cpu", **more):
+def draw(triangles, owners, eyes, axes, screen, device=CPU, **more):
     calls = np.column_stack([np.arange(len(owners)), np.arange(len(owners)) + 1, owners])
     starts = np.arange(len(eyes) + 1) * len(owners)
     return launch_raster(
@@ -101,7 +102,7 @@ def test_a_building_looks_as_embree_sees_it():
         height=screen.height,
         focal=screen.focal,
         near=NEAR_M * 1024,
-        threads=2,
+        device=Device(threads=2),
     ).ids
     embree = EmbreeScene(robust=True)
     TriangleMesh(embree, triangles.reshape(-1, 3).astype(np.float32), np.arange(len(triangles) * 3).reshape(-1, 3))
@@ -126,7 +127,7 @@ def test_frames_do_not_depend_on_threads_or_company():
     triangles = random_triangles(rng)
     views = [random_view(seed) for seed in range(5)]
     eyes, axes = (np.concatenate([view[k] for view in views]) for k in (0, 1))
-    together = draw(triangles, np.arange(len(triangles)), eyes, axes, screen, threads=2)
+    together = draw(triangles, np.arange(len(triangles)), eyes, axes, screen, device=Device(threads=2))
     for frame in range(5):
         alone = draw(triangles, np.arange(len(triangles)), eyes[frame : frame + 1], axes[frame : frame + 1], screen)
         assert np.array_equal(alone.ids[0], together.ids[frame])
@@ -194,7 +195,7 @@ def test_refuses_what_it_cannot_draw():
         launch_raster(triangles, *asked[:3], np.eye(3), **good)
     with pytest.raises(InputError, match="near above 0"):
         launch_raster(triangles, *asked, **(good | {"near": 0.0}))
-    with pytest.raises(InputError, match="resolution"):
+    with pytest.raises(InputError, match="image: expected at least 1x1"):
         Screen(0, 5)
     with pytest.raises(InputError, match="fov"):
         Screen(5, 5, 180.0)

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.errors import InputError
 from viewcell.kernels import select
+from viewcell.kernels.launch import Device
 from viewcell.kernels.select import launch_select
 from viewcell.solvers.levels.greedy import incremental_greedy, literal_greedy
 from viewcell.verify.exact.select import best_by_milp, best_by_table, upper_bound
@@ -176,7 +177,7 @@ def test_frames_threads_and_chunks_change_nothing(monkeypatch):
     together = launch_select(benefits, costs, starts, budgets)
     assert len(np.unique(together.choice, axis=0)) > 30
     monkeypatch.setattr(select, "CPU_LEVELS", 3000)
-    assert equal(together, launch_select(benefits, costs, starts, budgets, threads=3))
+    assert equal(together, launch_select(benefits, costs, starts, budgets, device=Device(threads=3)))
     for n in range(40):
         alone = launch_select(benefits[n : n + 1], costs, starts, int(budgets[n]))
         for field in fields(together):
@@ -187,7 +188,7 @@ def test_frames_threads_and_chunks_change_nothing(monkeypatch):
 def test_a_gpu_changes_nothing():
     benefits, costs, starts, _ = levels(200, 100, seed=6)
     budgets = np.random.default_rng(6).integers(0, costs.reshape(-1, 5)[:, 4].sum(), 100)
-    assert equal(*(launch_select(benefits, costs, starts, budgets, device=d) for d in ("cpu", "cuda:0")))
+    assert equal(*(launch_select(benefits, costs, starts, budgets, device=Device(name)) for name in ("cpu", "cuda:0")))
 
 
 def test_units_change_nothing():

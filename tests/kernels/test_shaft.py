@@ -11,9 +11,12 @@ from builders.random_solids import shields_of
 from viewcell.data.graph import OTHER_AXES
 from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
 from viewcell.data.solids import winding_numbers
+from viewcell.data.verdict import Verdict
+from viewcell.kernels.launch import Device
 from viewcell.kernels.shaft import launch_shaft, patches_met
-from viewcell.verify.exact.shadow import hides, load_shadow_cases, occluder
+from viewcell.verify.cases.case_file import load_shadow_cases
 from viewcell.verify.exact.sightline import Sight, Sightlines
+from viewcell.verify.exact.umbra import hides, occluder
 
 CASES = load_shadow_cases(HARD_CASES / "shadow.txt")
 # Nothing is halved.
@@ -84,7 +87,7 @@ def test_no_segment_from_outside_solids_reaches_what_is_hidden(seed):
     shields, _, _ = shields_of(scene)
     boxes, rows = random_pairs(random, 2000)
     answers = launch_shaft(shields, boxes, rows, smallest=(64, 64), cap=300)
-    hidden = rows[answers.verdict == 0]
+    hidden = rows[answers.verdict == Verdict.HIDDEN]
     assert 50 < len(hidden) < len(rows)
     segments = [eyes_and_points(random, boxes[v], boxes[x], 60) for v, x in hidden[:80]]
     origins, ends = (np.concatenate(part) for part in zip(*segments, strict=True))
@@ -104,7 +107,7 @@ def test_hard_umbra_cases(name):
     shields, _, _ = shields_of(scene)
     boxes = np.array([case.cell, case.box], np.int32)
     verdict = launch_shaft(shields, boxes, np.array([[0, 1]]), smallest=WHOLE).verdict[0]
-    assert verdict == (2 if case.expected == "not" else 0)
+    assert verdict == (Verdict.UNKNOWN if case.expected == "not" else Verdict.HIDDEN)
 
 
 @pytest.mark.parametrize("oblique", [False, True])
@@ -119,7 +122,7 @@ def test_one_occluder_is_decided_as_in_rationals(oblique):
         cell, boxes = boxes_around(random, outline)
         everything = np.concatenate([[cell], boxes])
         rows = np.column_stack([np.zeros(len(boxes), int), 1 + np.arange(len(boxes))])
-        hidden = launch_shaft(shields, everything, rows, smallest=WHOLE).verdict == 0
+        hidden = launch_shaft(shields, everything, rows, smallest=WHOLE).verdict == Verdict.HIDDEN
         exact = occluder(cell.tolist(), outline)
         for box, answer in zip(boxes, hidden, strict=True):
             corners = [[Fraction(int(c)) for c in corner] for corner in corners_of(box)]
@@ -139,11 +142,11 @@ def test_two_walls_hide_together_only_after_halving():
     shields, _, _ = shields_of(scene)
     boxes = np.array([[[-1024, 2300, 1024], [-512, 2800, 1536]], [[1400, 1500, 1024], [1600, 3500, 1536]]], np.int32)
     rows = np.array([[0, 1]])
-    assert launch_shaft(shields, boxes, rows, smallest=WHOLE).verdict[0] == 0
+    assert launch_shaft(shields, boxes, rows, smallest=WHOLE).verdict[0] == Verdict.HIDDEN
     boxes[1, :, 1] = 200, 4800
-    assert launch_shaft(shields, boxes, rows, smallest=WHOLE).verdict[0] == 2
+    assert launch_shaft(shields, boxes, rows, smallest=WHOLE).verdict[0] == Verdict.UNKNOWN
     answers = launch_shaft(shields, boxes, rows, smallest=(16, 16), cap=20_000, certify=True)
-    assert answers.verdict[0] == 0 and answers.leaves[0] > 1
+    assert answers.verdict[0] == Verdict.HIDDEN and answers.leaves[0] > 1
     sizes = (answers.certificate[:, 4:7] - answers.certificate[:, 1:4]).prod(axis=1) * (
         answers.certificate[:, 10:13] - answers.certificate[:, 7:10]
     ).prod(axis=1)
@@ -155,10 +158,10 @@ def test_answers_do_not_depend_on_threads_and_failing_pieces_are_unblocked_lines
     shields, _, _ = shields_of(scene)
     boxes, rows = random_pairs(np.random.default_rng(7), 3000)
     one = launch_shaft(shields, boxes, rows, smallest=(64, 64), cap=200, certify=True)
-    two = launch_shaft(shields, boxes, rows, smallest=(64, 64), cap=200, certify=True, threads=2)
+    two = launch_shaft(shields, boxes, rows, smallest=(64, 64), cap=200, certify=True, device=Device(threads=2))
     for name in ("verdict", "nodes", "leaves", "middle", "certificate", "starts"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
-    failed = np.flatnonzero(one.verdict == 2)
+    failed = np.flatnonzero(one.verdict == Verdict.UNKNOWN)
     inside = (one.middle[failed, 0] >= boxes[rows[failed, 0], 0]) & (one.middle[failed, 0] <= boxes[rows[failed, 0], 1])
     assert inside.all()
 
@@ -174,12 +177,12 @@ def test_lines_past_all_oblique_occluders_meet_none():
 def test_nothing_to_hide_with():
     shields, _, _ = shields_of(random_solids.scene_of_meshes([random_solids.box([0, 0, 0], [0.01, 0.01, 0.01])]))
     boxes, rows = random_pairs(np.random.default_rng(0), 10)
-    assert (launch_shaft(shields, boxes, rows, smallest=(64, 64)).verdict == 2).all()
+    assert (launch_shaft(shields, boxes, rows, smallest=(64, 64)).verdict == Verdict.UNKNOWN).all()
 
 
 def test_a_surface_on_the_occluder_is_not_hidden_by_it():
     shields, _, _ = shields_of(plate([[0, 0, 0], [0, 2048, 0], [0, 2048, 2048], [0, 0, 2048]]))
     boxes = np.array([[[-800, 900, 900], [-700, 1000, 1000]], [[0, 900, 900], [0, 1000, 1000]]], np.int32)
-    for shift, verdict in ((0, 2), (1, 0)):
+    for shift, verdict in ((0, Verdict.UNKNOWN), (1, Verdict.HIDDEN)):
         moved = boxes + np.array([[[0]], [[shift]]]) * [1, 0, 0]
         assert launch_shaft(shields, moved.astype(np.int32), np.array([[0, 1]]), smallest=WHOLE).verdict[0] == verdict

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from builders import random_buildings
+from viewcell.kernels.launch import CPU, Device
 from viewcell.kernels.sightline import aim_targets, device_triangles, launch_aim, launch_confirm
 from viewcell.verify.exact.sightline import Sight, Sightlines
 
@@ -59,7 +60,7 @@ def test_the_target_itself_is_no_obstacle():
     assert got.sum() > launch_confirm(scene, origins, ends, np.full(2000, NOBODY)).sum()
 
 
-def aimed(seed, at_objects, threads=1):
+def aimed(seed, at_objects, device=CPU):
     """Aim from boxes at boxes, or at objects: the work and what was found."""
     triangles, owners = clutter(seed)
     rng = np.random.default_rng(seed)
@@ -71,7 +72,7 @@ def aimed(seed, at_objects, threads=1):
     ranges = np.column_stack([starts[objects], starts[objects + 1]]) if at_objects else np.zeros((1500, 2), int)
     found = launch_aim(
         device_triangles(triangles, owners), aim_targets(triangles), sources, boxes, hints, objects, ranges,
-        np.arange(1500), np.arange(1500) % 2 == 0, tries=20, threads=threads,
+        np.arange(1500), np.arange(1500) % 2 == 0, tries=20, device=device,
     )  # fmt: skip
     return triangles, owners, sources, boxes, objects, found
 
@@ -103,6 +104,6 @@ def test_sightlines_aimed_at_objects_end_on_them(seed):
 
 @pytest.mark.parametrize("at_objects", [False, True])
 def test_threads_change_nothing(at_objects):
-    one, two = (aimed(4, at_objects, threads)[-1] for threads in (1, 2))
+    one, two = (aimed(4, at_objects, Device(threads=threads))[-1] for threads in (1, 2))
     for got, wanted in zip(two, one, strict=True):
         np.testing.assert_array_equal(got, wanted)

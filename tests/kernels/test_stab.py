@@ -12,14 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.errors import InputError
 from viewcell.data.verdict import Verdict
-from viewcell.kernels.stab import det_sign
+from viewcell.kernels.directions import det_sign
+from viewcell.kernels.launch import Device
 from viewcell.kernels.stab_batch import launch_stab
 from viewcell.verify.cases.case_file import load_cases
 from viewcell.verify.exact.stab import stab
 from viewcell.verify.proofs.stab import check_certificate
 from viewcell.verify.proofs.stab_cuts import stab_certificate
 
-HIDDEN, STABBED, UNDECIDED = range(3)
 OCTANTS = np.array(list(product((1, -1), repeat=3)))
 CASES = load_cases(HARD_CASES / "stab.txt")
 LIMIT = 2**24
@@ -68,17 +68,17 @@ def judge(boxes, signs, lengths=None, twin=True):
     for row, (verdict, length) in enumerate(zip(answers.verdict, lengths, strict=True)):
         used, octant = boxes[row, :length].astype(np.int64), tuple(signs[row].tolist())
         told = f"list {used.tolist()} in octant {octant}"
-        if verdict == HIDDEN:
+        if verdict == Verdict.HIDDEN:
             proof = stab_certificate(used, octant, answers.cuts[row])
             assert proof is not None and check_certificate(used, octant, proof), f"no proof: {told}"
-        elif verdict == STABBED:
+        elif verdict == Verdict.VISIBLE:
             point, direction = answers.line(row)
             assert tuple(1 if d > 0 else -1 for d in direction) == octant
             assert passes(used, point, direction), f"line misses: {told}"
-        if twin and verdict != UNDECIDED:
+        if twin and verdict != Verdict.UNKNOWN:
             truth = stab(used, octant).verdict
-            assert verdict != HIDDEN or truth is Verdict.HIDDEN, f"wrong-hidden: {told}"
-            assert verdict != STABBED or truth is Verdict.VISIBLE, f"wrong-stabbed: {told}"
+            assert verdict != Verdict.HIDDEN or truth is Verdict.HIDDEN, f"wrong-hidden: {told}"
+            assert verdict != Verdict.VISIBLE or truth is Verdict.VISIBLE, f"wrong-stabbed: {told}"
     return answers.verdict
 
 
@@ -172,8 +172,8 @@ def test_published_vectors(name):
     corners, is_open = VECTORS[name]
     boxes = np.array(corners).reshape(1, -1, 2, 3)
     signs = np.array([[1, 1, 1]])
-    assert judge(boxes, signs)[0] == (STABBED if is_open else HIDDEN)
-    assert judge(np.sort(-boxes, axis=2), -signs)[0] == (STABBED if is_open else HIDDEN)
+    assert judge(boxes, signs)[0] == (Verdict.VISIBLE if is_open else Verdict.HIDDEN)
+    assert judge(np.sort(-boxes, axis=2), -signs)[0] == (Verdict.VISIBLE if is_open else Verdict.HIDDEN)
 
 
 def test_hard_cases():
@@ -181,7 +181,7 @@ def test_hard_cases():
         # A local origin is subtracted exactly, as a bake does: 100 km in millimetres is beyond the grid.
         boxes = case.boxes - case.boxes[0, 0] if np.abs(case.boxes).max() > LIMIT else case.boxes
         verdict = judge(boxes[None], np.array([case.signs]))[0]
-        assert verdict == UNDECIDED or (verdict == STABBED) == (case.expected == "open"), case.name
+        assert verdict == Verdict.UNKNOWN or (verdict == Verdict.VISIBLE) == (case.expected == "open"), case.name
 
 
 @wp.kernel
@@ -215,9 +215,9 @@ def test_sign_of_a_cut_is_exact():
 def check_generated(count, seed):
     verdicts = judge(*generated(count, seed))
     tally = np.bincount(verdicts, minlength=3)
-    print(f"{count} lists: hidden {tally[HIDDEN]}, stabbed {tally[STABBED]}, undecided {tally[UNDECIDED]}")
-    assert tally[HIDDEN] > count // 5 and tally[STABBED] > count // 10
-    assert tally[UNDECIDED] <= count // 100
+    print(f"{count} lists: {', '.join(f'{verdict.word} {tally[verdict]}' for verdict in Verdict)}")
+    assert tally[Verdict.HIDDEN] > count // 5 and tally[Verdict.VISIBLE] > count // 10
+    assert tally[Verdict.UNKNOWN] <= count // 100
 
 
 def test_agrees_with_the_exact_twin():
@@ -231,7 +231,7 @@ def test_agrees_with_the_exact_twin_on_many():
 
 def test_threads_change_nothing():
     boxes, signs, lengths = (np.tile(x, (3,) + (1,) * (x.ndim - 1)) for x in generated(1000, seed=3))
-    one, two = (launch_stab(boxes, signs, lengths, threads=threads) for threads in (1, 2))
+    one, two = (launch_stab(boxes, signs, lengths, device=Device(threads=threads)) for threads in (1, 2))
     for name in one.__dataclass_fields__:
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name), err_msg=name)
 
@@ -251,7 +251,7 @@ def verdict_of(boxes, signs):
 
 def agree(a, b):
     """Decided verdicts never contradict each other; which trial finds a thin line may differ."""
-    return a == b or UNDECIDED in (a, b)
+    return a == b or Verdict.UNKNOWN in (a, b)
 
 
 @given(lists(), st.permutations(range(3)), st.integers(-(2**22), 2**22))
@@ -273,8 +273,8 @@ def test_the_way_back_is_the_same(sequence):
 @given(lists(), lists())
 def test_one_more_box_never_opens(sequence, other):
     boxes, signs = sequence
-    if verdict_of(boxes, signs) == HIDDEN:
-        assert verdict_of(np.concatenate([boxes, other[0][:1]]), signs) != STABBED
+    if verdict_of(boxes, signs) == Verdict.HIDDEN:
+        assert verdict_of(np.concatenate([boxes, other[0][:1]]), signs) != Verdict.VISIBLE
 
 
 def test_a_list_too_long_is_refused():

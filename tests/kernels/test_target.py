@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from builders.blocker_scenes import blockers_of, case, clear_segments, shown
-from viewcell.kernels.target import blocker_tree, launch_target_search
+from viewcell.data.verdict import Verdict
+from viewcell.kernels.blockers import blocker_tree
+from viewcell.kernels.target import launch_target_search
 
 
 def compare(seeds: range, segments: int) -> dict[str, int]:
@@ -18,11 +20,11 @@ def compare(seeds: range, segments: int) -> dict[str, int]:
         answers = launch_target_search(
             blocker_tree(blockers_of(boxes)), np.stack([source, target]), np.array([[0, 1, int(strict)]]), cap=5000
         )
-        hidden = answers.verdict[0] == 0
+        hidden = answers.verdict[0] == Verdict.HIDDEN
         seen = shown(source, target, boxes, strict, seed, segments)
         assert not (hidden and seen), f"seed {seed}: called hidden, but a random segment is clear"
         count["hidden"] += int(hidden)
-        count["visible"] += int(answers.verdict[0] == 1)
+        count["visible"] += int(answers.verdict[0] == Verdict.VISIBLE)
         count["shown"] += int(seen)
     return count
 
@@ -45,7 +47,7 @@ def test_a_blocker_behind_the_near_face_of_the_target_hides_nothing_before_it():
     answers = launch_target_search(
         blocker_tree(blockers_of(np.array([wall]))), np.array([source, target], np.int32), np.array([[0, 1, 1]])
     )
-    assert answers.verdict[0] == 1
+    assert answers.verdict[0] == Verdict.VISIBLE
 
 
 def test_a_row_of_cabinets_does_not_hide_its_own_front():
@@ -55,7 +57,7 @@ def test_a_row_of_cabinets_does_not_hide_its_own_front():
     answers = launch_target_search(
         blocker_tree(blockers_of(np.array([fronts]))), np.array([source, target], np.int32), np.array([[0, 1, 1]])
     )
-    assert answers.verdict[0] == 1
+    assert answers.verdict[0] == Verdict.VISIBLE
 
 
 def test_a_line_called_visible_crosses_nothing():
@@ -69,7 +71,7 @@ def test_a_line_called_visible_crosses_nothing():
         answers = launch_target_search(
             blocker_tree(blockers_of(boxes)), np.stack([source, target]), np.array([[0, 1, int(strict)]]), cap=5000
         )
-        if answers.verdict[0] != 1:
+        if answers.verdict[0] != Verdict.VISIBLE:
             continue
         sign = np.where((answers.octant[0] >> np.arange(3)) & 1, -1.0, 1.0)
         w, xi = answers.line[0], answers.offset[0]

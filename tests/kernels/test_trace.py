@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from builders import random_buildings
 from viewcell.kernels.graph import device_graph
-from viewcell.kernels.trace import launch_walk
-from viewcell.verify.rays.trace import portal_links, portal_path
+from viewcell.kernels.launch import Device
+from viewcell.kernels.trace import launch_trace
+from viewcell.verify.exact.trace import portal_links, portal_path
 
 
 def random_segments(graph, rng, count):
@@ -42,7 +43,7 @@ def check_exactly(graph, cell, target, portals, origin, end):
 def test_walks_as_the_exact_twin_walks(seed):
     graph, _ = random_buildings.random_graph(seed, walls=5)
     sources, origins, ends = random_segments(graph, np.random.default_rng(seed), 500)
-    reached, starts, portals = launch_walk(device_graph(graph), sources, origins, ends)
+    reached, starts, portals = launch_trace(device_graph(graph), sources, origins, ends)
     lines = np.stack([origins, ends - origins], axis=1)
     holding = (graph.cells[None, :, 0] < ends[:, None]).all(axis=2) & (graph.cells[None, :, 1] > ends[:, None]).all(
         axis=2
@@ -62,7 +63,7 @@ def test_walks_as_the_exact_twin_walks(seed):
 def test_threads_change_nothing():
     graph, _ = random_buildings.random_graph(1, walls=5)
     work = random_segments(graph, np.random.default_rng(1), 3000)
-    one, two = (launch_walk(device_graph(graph), *work, threads=threads) for threads in (1, 2))
+    one, two = (launch_trace(device_graph(graph), *work, device=Device(threads=threads)) for threads in (1, 2))
     for got, wanted in zip(two, one, strict=True):
         np.testing.assert_array_equal(got, wanted)
 
@@ -77,5 +78,5 @@ def test_a_line_through_an_edge_of_a_portal_is_given_up():
     origin, end = rim.copy(), rim.copy()
     origin[axis] -= 0.25 * (cell[1, axis] - cell[0, axis])
     end[axis] += 1
-    reached, _, _ = launch_walk(device_graph(graph), graph.portal_cells[:1, 0], origin[None], end[None])
+    reached, _, _ = launch_trace(device_graph(graph), graph.portal_cells[:1, 0], origin[None], end[None])
     assert reached[0] == -1

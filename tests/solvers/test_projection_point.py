@@ -11,7 +11,8 @@ from builders import outlines
 from builders.outlines import outline_table
 from builders.projection_problems import exact_optimum, one_problem, random_problems, random_umbras, rectangle
 from viewcell.data.errors import InputError
-from viewcell.kernels.shadow import STRADDLES, USABLE, launch_shrink, launch_umbra
+from viewcell.kernels.shrink import launch_shrink
+from viewcell.kernels.umbra import STRADDLES, USABLE, launch_umbra
 from viewcell.solvers.projection_point import (
     BOUNDED,
     MOST_HEIGHT,
@@ -24,7 +25,8 @@ from viewcell.solvers.projection_point import (
 )
 from viewcell.solvers.referees import cone_point, feasible_point, gradient_point, searched_point, vertex_point
 from viewcell.solvers.result import ADVICE, Status
-from viewcell.verify.exact.shadow import dot, lowest_height
+from viewcell.verify.arithmetic import dot
+from viewcell.verify.exact.umbra import lowest_height
 
 
 def test_lowest_points_are_those_of_the_exact_programme():

@@ -10,7 +10,7 @@ import viewcell
 from builders import four_rooms
 from builders.places import ROOT
 from viewcell.data.store.scene_folder import write_scene
-from viewcell.solvers.visibility.engine import Engine
+from viewcell.solvers.visibility.portal_engine import PortalEngine
 from viewcell.workbench.cli import main
 
 TABLES = ("meshes", "objects", "cells", "portals", "cell_to_cell", "cell_to_object")
@@ -132,7 +132,7 @@ def test_interrupted_before_the_end_leaves_no_bake(office, tmp_path, monkeypatch
     def interrupt(self, block):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Engine, "visible", interrupt)
+    monkeypatch.setattr(PortalEngine, "visible", interrupt)
     assert main(["bake", str(office), "--out", str(tmp_path / "o.bake"), "--no-progress"]) == 130
     assert "run the same command again" in capsys.readouterr().err
     assert not (tmp_path / "o.bake").exists()
@@ -149,32 +149,32 @@ def test_interrupted_bake_resumes_to_the_same_result(tmp_path):
     code = """
 import os, signal, sys, threading
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from viewcell.solvers.visibility.engine import Engine
+from viewcell.solvers.visibility.portal_engine import PortalEngine
 from viewcell.workbench.cli import main
-visible, blocks = Engine.visible, []
+visible, blocks = PortalEngine.visible, []
 def interrupted(self, block):
     blocks.append(block)
     if len(blocks) == 2:
         threading.Timer(0.02, os.kill, (os.getpid(), signal.SIGINT)).start()
     return visible(self, block)
-Engine.visible = interrupted
+PortalEngine.visible = interrupted
 sys.exit(main(sys.argv[1:]))
 """
     command = [sys.executable, "-c", code, *arguments, str(out)]
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     assert done.returncode == 130
     assert done.stderr == "viewcell: interrupted; run the same command again to resume\n"
-    assert hashes(out) == old and list(tmp_path.glob(".o.bake.partial/0.block"))
+    assert hashes(out) == old and list(tmp_path.glob(".o.bake.partial/0.arrow"))
     assert main([*arguments, str(out)]) == 0
     assert main([*arguments, str(whole)]) == 0
     assert_same_tables(out, whole)
     assert not list(tmp_path.glob(".*"))
 
 
-def test_verify_is_callable_although_a_subpackage_has_its_name(baked):
+def test_bakes_verify_themselves_and_subpackages_hide_no_function(baked):
     code = (
-        "import viewcell.verify.rays.embree, viewcell; "
-        f"assert viewcell.verify(viewcell.load({str(baked)!r}), rays=1000).ok; "
+        "import viewcell.workbench.bake.run, viewcell; "
+        f"assert viewcell.load({str(baked)!r}).verify(rays=1000).ok; "
         "assert callable(viewcell.bake) and callable(viewcell.report)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

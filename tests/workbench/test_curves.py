@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
-from viewcell.data.store.database import load
 from viewcell.workbench import curves
-from viewcell.workbench.bake.run import Settings, bake
+from viewcell.workbench.bake.run import bake
+from viewcell.workbench.bake.settings import Settings
+from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
 from viewcell.workbench.curves import Point, Series, pareto_points, read_curves, sweep
 from viewcell.workbench.verify import seen_by_rays

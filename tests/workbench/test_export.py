@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from viewcell.data.store.database import load
 from viewcell.data.store.quake import axial_graph, read_prt
+from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
 
 

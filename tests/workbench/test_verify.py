@@ -14,16 +14,17 @@ from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.graph import OTHER_AXES, CellGraph
 from viewcell.data.store.scene_folder import write_scene
+from viewcell.data.verdict import Verdict
 from viewcell.verify.cases.case_file import WrongHidden, load_cases, read_case, write_case
 from viewcell.verify.exact.sightline import Sightlines
+from viewcell.verify.exact.trace import contact_links, portal_links
 from viewcell.verify.rays.adjudicate import Judgement
 from viewcell.verify.rays.starts import aim_points, cell_origins, frontier_points
-from viewcell.verify.rays.trace import contact_links, portal_links
 from viewcell.workbench import verify as workbench_verify
 from viewcell.workbench.bake.run import bake
 from viewcell.workbench.bench import flood as flood_bench
 from viewcell.workbench.bench import models as models_bench
-from viewcell.workbench.verify import make_judge, replay, verify
+from viewcell.workbench.verify import make_judge, replay, verify_bake
 
 GRID = 2.0**-10
 RAYS = 100_000
@@ -54,14 +55,14 @@ def row_of(table, cell, target, column="reached_cell_id"):
 def refusal(bake, **values):
     """The reason why the witness of cell 0 to cell 4 is refuted after the change."""
     bake.cell_to_cell = changed(bake.cell_to_cell, row_of(bake.cell_to_cell, 0, 4), **values)
-    result = verify(bake, rays=0)
+    result = verify_bake(bake, rays=0)
     assert not result.ok and result.cell_witnesses.refuted == 1
     assert result.cell_witnesses.examples[0].startswith("cell 0 sees cell 4: ")
     return result.cell_witnesses.examples[0].partition(": ")[2]
 
 
 def test_a_true_bake_stands(house):
-    result = verify(house, rays=RAYS)
+    result = verify_bake(house, rays=RAYS)
     assert result.ok and result.wrong_hidden == 0 and result.case is None
     assert result.rays >= RAYS and result.dark_cells == 0
     assert result.cell_witnesses.confirmed == house.potential_cells.sum()
@@ -74,7 +75,7 @@ def test_a_true_bake_stands(house):
 
 
 def test_a_true_bare_graph_stands(bare):
-    result = verify(bare, rays=RAYS)
+    result = verify_bake(bare, rays=RAYS)
     assert result.ok and not result.embree_rates and result.rate_ratio == 0
     assert result.cell_rays == result.rays
     # Cell 1 shows itself to one ray in 20,000 from cell 5.
@@ -82,7 +83,7 @@ def test_a_true_bare_graph_stands(bare):
 
 
 def test_same_seed_same_findings(house):
-    first, second = (verify(house, rays=RAYS, seed=3) for _ in range(2))
+    first, second = (verify_bake(house, rays=RAYS, seed=3) for _ in range(2))
     assert first.counts == second.counts and first.grazes == second.grazes
 
 
@@ -92,7 +93,7 @@ def test_every_planted_hidden_cell_is_found(kind, request):
     for cell, target in np.argwhere(bake.potential_cells):
         if cell != target:
             bake.potential_cells[cell, target] = False
-            result = verify(bake, rays=RAYS)
+            result = verify_bake(bake, rays=RAYS)
             assert result.wrong_hidden == 1 and not result.ok, (cell, target)
             case = read_case(result.case)
             assert (case.cell, case.kind, case.target) == (cell, "cell", target)
@@ -106,7 +107,7 @@ def test_every_planted_hidden_cell_is_found(kind, request):
 def test_every_planted_hidden_object_is_found(house, target):
     """The floor, the desk, the pane."""
     house.potential_objects[2, target] = False
-    result = verify(house, rays=RAYS)
+    result = verify_bake(house, rays=RAYS)
     assert result.wrong_hidden == 1
     case = read_case(result.case)
     assert (case.cell, case.kind, case.target) == (2, "object", target)
@@ -119,17 +120,17 @@ def test_guided_rays_find_what_is_planted(house, kind, monkeypatch):
     """Alone: the even rays are left out."""
     monkeypatch.setattr(workbench_verify, "_cast_all", lambda *_: None)
     (house.potential_cells if kind == "cell" else house.potential_objects)[2, 4] = False
-    result = verify(house, rays=RAYS)
+    result = verify_bake(house, rays=RAYS)
     assert result.wrong_hidden == 1 and not result.ok and "confidence" not in result.table()
     case = read_case(result.case)
     assert (case.cell, case.kind, case.target) == (2, kind, 4) and not replay(result.case, house).ok
 
 
 def test_verify_says_how_sure_it_is(house, bare):
-    result = verify(house, rays=RAYS)
+    result = verify_bake(house, rays=RAYS)
     assert result.guided_rays == RAYS // 4 and len(result.random_rays) == house.graph.inhabitable.sum()
     assert "with 95 % confidence no view cell of 4 hides more than" in result.table()
-    assert "confidence" not in verify(bare, rays=1000).table()
+    assert "confidence" not in verify_bake(bare, rays=1000).table()
 
 
 def test_a_missing_portal_is_found(house):
@@ -141,7 +142,7 @@ def test_a_missing_portal_is_found(house):
     )
     house.potential_cells[0] = False
     house.potential_cells[0, 0] = True
-    assert verify(house, rays=RAYS).wrong_hidden == 1
+    assert verify_bake(house, rays=RAYS).wrong_hidden == 1
 
 
 def test_a_crack_is_a_leak_below_the_seal(house):
@@ -153,7 +154,7 @@ def test_a_crack_is_a_leak_below_the_seal(house):
         house.manifest["settings"]["seal"] = seal * GRID
         assert make_judge(house).judge("cell", 0, 2, origin, end) is outcome
     house.potential_cells[0] = [True, False, False, False, False, False, False]
-    result = verify(house, rays=RAYS)
+    result = verify_bake(house, rays=RAYS)
     assert result.leaks > 0
 
 
@@ -206,14 +207,14 @@ def test_witness_through_a_wall_or_a_desk_is_blocked(house):
     row = row_of(house.cell_to_cell, 2, 2)
     for height, outcome in ((3, "is blocked"), (4, "grazes a triangle"), (8, "grazes a triangle")):
         house.cell_to_cell = changed(house.cell_to_cell, row, **line, origin_z=height / 16)
-        assert verify(house, rays=0).cell_witnesses.examples == [f"cell 2 sees cell 2: {outcome}"]
+        assert verify_bake(house, rays=0).cell_witnesses.examples == [f"cell 2 sees cell 2: {outcome}"]
 
 
 def test_witness_from_inside_the_desk(house):
     row = row_of(house.cell_to_cell, 2, 2)
     inside = {"origin_x": 63 / 16, "origin_y": 35 / 16, "origin_z": 4 / 16}
     house.cell_to_cell = changed(house.cell_to_cell, row, **inside)
-    assert verify(house, rays=0).cell_witnesses.examples == ["cell 2 sees cell 2: starts on or inside a solid"]
+    assert verify_bake(house, rays=0).cell_witnesses.examples == ["cell 2 sees cell 2: starts on or inside a solid"]
 
 
 def object_witness(house, target, end, start=(46, 20, 10)):
@@ -222,7 +223,7 @@ def object_witness(house, target, end, start=(46, 20, 10)):
     vector |= {f"direction_{a}": (e - s) / 16 for a, s, e in zip("xyz", start, end, strict=True)}
     row = row_of(house.cell_to_object, 2, target, "object_id")
     house.cell_to_object = changed(house.cell_to_object, row, verdict="visible", **vector)
-    result = verify(house, rays=0)
+    result = verify_bake(house, rays=0)
     return result.object_witnesses.examples or result.object_witnesses.confirmed
 
 
@@ -276,13 +277,13 @@ def test_a_cell_inside_a_solid_has_no_rays(house):
     house.graph.cells[0] = np.array([[85, 1, 1], [87, 4, 4]]) * 64
     house.cell_to_cell = house.cell_to_cell.slice(0, 0)
     house.potential_cells[:, 0] = house.potential_cells[0] = True
-    result = verify(house, rays=RAYS)
+    result = verify_bake(house, rays=RAYS)
     assert result.dark_cells == 1 and result.wrong_hidden == 0
 
 
 def test_table_names_the_findings(house):
     house.potential_cells[0, 4] = False
-    result = verify(house, rays=RAYS)
+    result = verify_bake(house, rays=RAYS)
     assert "wrong-hidden | 1 (case file" in result.table()
     assert "| cells, inhabitable | 13 |" in result.table()
 
@@ -309,7 +310,7 @@ def test_case_files(tmp_path):
 
 def test_bad_arguments(house, tmp_path):
     with pytest.raises(InputError, match="expected 0 or more, found -1"):
-        verify(house, rays=-1)
+        verify_bake(house, rays=-1)
     case = WrongHidden(str(house.folder), "", 0, "cell", 700, (0.0,) * 3, (1.0,) * 3)
     with pytest.raises(InputError, match="found cell 0, target 700"):
         replay(write_case(case), house)
@@ -352,7 +353,7 @@ def test_rays_through_a_building_stay_in_the_transitive_closure(bare):
     bake = dataclasses.replace(bare, graph=graph, grid_m=1 / 32, potential_cells=reach)
     bake = dataclasses.replace(bake, cell_to_cell=bare.cell_to_cell.slice(0, 0))
     bake = dataclasses.replace(bake, potential_objects=np.zeros((graph.cell_count, 0), bool))
-    result = verify(bake, rays=200_000)
+    result = verify_bake(bake, rays=200_000)
     assert result.wrong_hidden == 0 and result.blocked == 0
     assert 20 < sum(c.by_rays for c in result.counts[:2]) / graph.inhabitable.sum() <= 38.6
 
@@ -387,11 +388,15 @@ def test_undecided_pairs_are_counted_among_the_unknown(tmp_path, monkeypatch):
     verdicts = made.cell_to_cell["verdict"].to_pylist()
     pairs = zip(made.cell_to_cell["cell_id"].to_pylist(), made.cell_to_cell["reached_cell_id"].to_pylist(), strict=True)
     changed_row = next(number for number, (cell, reached) in enumerate(pairs) if cell != reached)
-    found = SimpleNamespace(verdict=np.array([2]))
-    monkeypatch.setattr(models_bench, "search_rounds", lambda model, boxes, rows: found if len(rows) == 1 else None)
+    found = SimpleNamespace(verdict=np.array([Verdict.UNKNOWN]))
+
+    def search(tree, boxes, rows, device):
+        return SimpleNamespace(verdict=found.verdict[: len(rows)])
+
+    monkeypatch.setattr(models_bench, "search_rounds", search)
     assert "unknown" not in verdicts and models_bench.undecided_percent(made) == 0
     made.cell_to_cell = changed(made.cell_to_cell, changed_row, verdict="unknown")
     size = made.graph.inhabitable.sum() * made.graph.cell_count
     assert models_bench.undecided_percent(made) == pytest.approx(100 / size)
-    found.verdict[:] = 1
+    found.verdict[:] = Verdict.VISIBLE
     assert models_bench.undecided_percent(made) == 0

@@ -1,4 +1,4 @@
-"""Case files: hard stabbing cases, one a line, and replayable accounts of a wrong verdict."""
+"""Case files: hard stabbing and umbra cases, one per line, and replayable accounts of a wrong verdict."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -55,6 +55,57 @@ def load_cases(path: str | Path) -> list[StabCase]:
             where = f"{path}, line {number}"
             raise InputError(f"{where}: expected 'name; expected; signs; boxes; origin', found {line!r}") from None
         cases.append(StabCase(name, expected, octant, table, origin))
+    return cases
+
+
+@dataclass(frozen=True)
+class ShadowCase:
+    """One hard umbra question.
+
+    Attributes:
+        name: unique.
+        expected: "hidden" (the box is in the umbra), "touch" (it is, and touches its border) or "not".
+        cell: (low, high) [grid steps].
+        outline: corners [grid steps].
+        box: (low, high) [grid steps].
+        rho: of two opposite edges, the first and the third, rounded to 4 digits; None where the cell straddles.
+        origin: where the case came from.
+    """
+
+    name: str
+    expected: str
+    cell: list[list[int]]
+    outline: list[list[int]]
+    box: list[list[int]]
+    rho: tuple[float, float] | None
+    origin: str
+
+
+def load_shadow_cases(path: str | Path) -> list[ShadowCase]:
+    """Cases of a text file: `name; expected; cell; outline; box; rho; origin` a line, # starts a comment.
+
+    A point is `x y z`; points are separated by commas; rho is two numbers or `-`.
+
+    Raises:
+        InputError: a line has another form.
+    """
+    cases = []
+    for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
+        line = line.partition("#")[0].strip()
+        if not line:
+            continue
+        try:
+            name, expected, *points, rho, origin = (part.strip() for part in line.split(";"))
+            cell, outline, box = ([[int(c) for c in point.split()] for point in part.split(",")] for part in points)
+            pair = None if rho == "-" else tuple(float(r) for r in rho.split())
+            if expected not in ("hidden", "touch", "not") or {len(p) for p in cell + outline + box} != {3}:
+                raise ValueError
+            if len(cell) != 2 or len(box) != 2 or len(outline) < 3 or (pair is not None and len(pair) != 2):
+                raise ValueError
+        except ValueError:
+            form = "name; expected; cell; outline; box; rho; origin"
+            raise InputError(f"{path}, line {number}: expected '{form}', found {line!r}") from None
+        cases.append(ShadowCase(name, expected, cell, outline, box, pair, origin))
     return cases
 
 

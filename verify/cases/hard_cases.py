@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ...data.errors import InputError
-from ..exact.shadow import ShadowCase, load_shadow_cases
-from .case_file import StabCase, load_cases
+from .case_file import ShadowCase, StabCase, load_cases, load_shadow_cases
 
 FOLDER = Path(__file__).resolve().parents[2] / "data" / "hard_cases"
 # Corners of a box's faces, bit i of a corner for the high side of axis i; counter-clockwise seen from outside.

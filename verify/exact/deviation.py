@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from itertools import count
 
-from ..arithmetic import dot
+from ..arithmetic import along, dot, minus
 
 Point = tuple[Fraction, Fraction, Fraction]
 Triangle = tuple[Point, Point, Point]
@@ -21,20 +21,20 @@ def squared_distance(p: Point, triangle: Triangle) -> Fraction:
     """Squared distance of a point from a closed triangle, which may be a segment or a point."""
     candidates = list(triangle)
     for a, b in ((0, 1), (1, 2), (2, 0)):
-        start, along = triangle[a], _minus(triangle[b], triangle[a])
-        size = dot(along, along)
-        if size and 0 < dot(_minus(p, start), along) < size:
-            candidates.append(_along(start, along, dot(_minus(p, start), along) / size))
-    corner, u, v = triangle[0], _minus(triangle[1], triangle[0]), _minus(triangle[2], triangle[0])
+        start, edge = triangle[a], minus(triangle[b], triangle[a])
+        size = dot(edge, edge)
+        if size and 0 < dot(minus(p, start), edge) < size:
+            candidates.append(along(start, dot(minus(p, start), edge) / size, edge))
+    corner, u, v = triangle[0], minus(triangle[1], triangle[0]), minus(triangle[2], triangle[0])
     # p - corner = s u + t v + (across): the normal equations, by Cramer's rule.
     uu, uv, vv = dot(u, u), dot(u, v), dot(v, v)
-    pu, pv = dot(_minus(p, corner), u), dot(_minus(p, corner), v)
+    pu, pv = dot(minus(p, corner), u), dot(minus(p, corner), v)
     gram = uu * vv - uv * uv
     if gram:
         s, t = (pu * vv - pv * uv) / gram, (pv * uu - pu * uv) / gram
         if s > 0 and t > 0 and s + t < 1:
-            candidates.append(_along(_along(corner, u, s), v, t))
-    return min(dot(_minus(p, q), _minus(p, q)) for q in candidates)
+            candidates.append(along(along(corner, s, u), t, v))
+    return min(dot(minus(p, q), minus(p, q)) for q in candidates)
 
 
 def deviation_squared(a: Sequence[Triangle], b: Sequence[Triangle], pieces: int) -> tuple[Fraction, Fraction]:
@@ -69,14 +69,6 @@ def deviation_squared(a: Sequence[Triangle], b: Sequence[Triangle], pieces: int)
         for quarter in _quarters(piece):
             lower = max(lower, add(quarter, -upper))
     return lower, max(lower, -queue[0][0])
-
-
-def _minus(p: Point, q: Point) -> Point:
-    return tuple(x - y for x, y in zip(p, q, strict=True))
-
-
-def _along(p: Point, direction: Point, t: Fraction) -> Point:
-    return tuple(x + t * d for x, d in zip(p, direction, strict=True))
 
 
 def _centroid(piece: Triangle) -> Point:

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-Point = tuple[Fraction, ...]
+from ..arithmetic import cross, dot, fractions, minus
 
 
 @dataclass(frozen=True)
@@ -23,21 +23,6 @@ class Hit:
     owner: int
     clear: Fraction | None
     lead: Fraction | None
-
-
-def exact(values: Sequence[float]) -> Point:
-    """The numbers as rationals."""
-    return tuple(Fraction(float(value)) for value in values)
-
-
-def dot(a: Point, b: Point) -> Fraction:
-    """Scalar product."""
-    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
-
-
-def cross(a: Point, b: Point) -> Point:
-    """Vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def first_hit(
@@ -60,15 +45,12 @@ def first_hit(
         focal: in the same unit.
         near: smallest depth that is drawn.
     """
-    ray = (*exact(pixel), Fraction(float(focal)))
-    origin, rows, least = exact(eye), [exact(row) for row in axes], Fraction(float(near))
+    ray = [*fractions(pixel), Fraction(float(focal))]
+    origin, rows, least = fractions(eye), [fractions(row) for row in axes], Fraction(float(near))
     nearest: dict[int, Fraction] = {}
     clear: Fraction | None = None
     for corners, owner in zip(triangles, owners, strict=True):
-        a, b, c = (
-            tuple(dot(row, tuple(x - o for x, o in zip(exact(p), origin, strict=True))) for row in rows)
-            for p in corners
-        )
+        a, b, c = ([dot(row, minus(fractions(p), origin)) for row in rows] for p in corners)
         sides = [cross(b, c), cross(c, a), cross(a, b)]
         volume = dot(a, sides[0])
         if volume == 0:

@@ -26,9 +26,8 @@ import numpy as np
 
 from ...data.errors import InputError
 from ...data.verdict import Verdict
-from ..arithmetic import cross, dot, minus
+from ..arithmetic import along, cross, dot, minus
 from .matrix_game import play
-from .shadow import along
 
 Rational = int | float | Fraction
 Point = list[Fraction]

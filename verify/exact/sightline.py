@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from ...data.errors import InputError
-from ..arithmetic import MISS, column_crossing, crossing_kind
 from .boxtree import BoxTree
+from .segment import MISS, column_crossing, crossing_kind
 
 BATCH = 16384
 THREADS = 2

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...data.errors import InputError
-from ...data.scene import Role
+from ...data.scene import OPAQUE
 from ...data.store.certificates import BLOCKERS, CORNERS, NODE_STEP, PROOFS, TABLES, TREES
 from ...data.store.scene_folder import read_table
 from .boxes import in_boxes
@@ -28,7 +28,7 @@ from .tables import box_text, corners_of, places_of
 
 if TYPE_CHECKING:
     from ...data.graph import CellGraph
-    from ...data.store.database import Bake
+    from ...data.store.bake_folder import BakeFolder
 
 Box = list[list[int]]
 # Rows (i, j, a, b) are kept in a list for each ordered pair of axes; a cycle takes one row of each of its lists.
@@ -45,12 +45,12 @@ class Blocker:
     box: Box
 
 
-def has_certificates(bake: "Bake") -> bool:
+def has_certificates(bake: "BakeFolder") -> bool:
     """Whether a bake claims to have them, or has some."""
     return bool(bake.manifest.get("settings", {}).get("certify")) or (bake.folder / "proofs.parquet").exists()
 
 
-def check_certificates(bake: "Bake") -> Certified:
+def check_certificates(bake: "BakeFolder") -> Certified:
     """Check every certificate of a bake, and that everything it hides has one.
 
     Exact: a blocker, a proof or a pair is called good only if it is. What another maker certifies by a partition that
@@ -203,16 +203,14 @@ def contradict(cuts: list[list[int]]) -> bool:
     )
 
 
-def _opaque_surfaces(bake: "Bake") -> OpaqueSurfaces | None:
+def _opaque_surfaces(bake: "BakeFolder") -> OpaqueSurfaces | None:
     """Opaque triangles of the model; None for a bare graph."""
     if bake.scene is None:
         return None
-    triangles, owners = bake.scene.triangles()
-    opaque = bake.scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
-    return OpaqueSurfaces(triangles[opaque], owners[opaque])
+    return OpaqueSurfaces(*bake.scene.triangles(*OPAQUE))
 
 
-def _read_blockers(bake: "Bake", surfaces: OpaqueSurfaces | None, found: Certified) -> dict[int, Blocker]:
+def _read_blockers(bake: "BakeFolder", surfaces: OpaqueSurfaces | None, found: Certified) -> dict[int, Blocker]:
     """Blockers by id, without those that are not real."""
     path = bake.folder / "blockers.parquet"
     table = read_table(path, BLOCKERS)
@@ -250,7 +248,7 @@ def graph_blocks(graph: "CellGraph", axis: int, plane: int, rectangle: np.ndarra
     return not ((gaps[:, 0] < rectangle[1]) & (gaps[:, 1] > rectangle[0])).all(axis=1).any()
 
 
-def _check_cells(bake: "Bake", cell: np.ndarray, boxes: np.ndarray, found: Certified) -> None:
+def _check_cells(bake: "BakeFolder", cell: np.ndarray, boxes: np.ndarray, found: Certified) -> None:
     """Count the hidden pairs of cells that proofs cover: a sightline can be followed either way."""
     cells, inhabitable = bake.graph.cells, bake.graph.inhabitable
     proved = np.zeros((len(cells), len(cells)), bool)
@@ -263,12 +261,11 @@ def _check_cells(bake: "Bake", cell: np.ndarray, boxes: np.ndarray, found: Certi
     found.tell(f"cell {a}, cell {b}: hidden, but in no box of a proof that holds" for a, b in bad)
 
 
-def _check_objects(bake: "Bake", cell: np.ndarray, boxes: np.ndarray, found: Certified) -> None:
+def _check_objects(bake: "BakeFolder", cell: np.ndarray, boxes: np.ndarray, found: Certified) -> None:
     """Count the hidden pairs (cell, object) whose triangles lie in boxes of proofs."""
     if bake.scene is None:
         return
-    triangles, owners = bake.scene.triangles()
-    starts = np.searchsorted(owners, np.arange(len(bake.scene.objects) + 1))
+    triangles, starts = bake.scene.triangles()[0], bake.scene.triangle_starts
     bounds, present = bake.scene.object_bounds(), np.diff(starts) > 0
     known: dict[tuple[int, bytes], bool] = {}
     bad = []

@@ -16,7 +16,7 @@ occluders form an open set.
 from collections.abc import Sequence
 from fractions import Fraction
 
-from ..exact.shadow import clip, cross, dot, minus, rational
+from ..arithmetic import clip, cross, dot, minus, rational
 
 Points = Sequence[Sequence[Fraction]]
 

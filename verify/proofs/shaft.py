@@ -20,7 +20,7 @@ from .opaque import OpaqueSurfaces, area_vector, bounds_disc
 from .tables import box_text, corners_of, places_of, steps_of
 
 if TYPE_CHECKING:
-    from ...data.store.database import Bake
+    from ...data.store.bake_folder import BakeFolder
 
 Box = list[list[int]]
 Point = list[int]
@@ -145,7 +145,7 @@ def tiled(low: list[int], high: list[int], leaves: list[Box]) -> bool:
 
 
 def check_shafts(
-    bake: "Bake",
+    bake: "BakeFolder",
     surfaces: OpaqueSurfaces | None,
     ids: np.ndarray,
     cells: np.ndarray,

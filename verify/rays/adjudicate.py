@@ -6,11 +6,11 @@ from enum import IntEnum
 import numpy as np
 
 from ...data.graph import CellGraph
-from ..arithmetic import BLOCKED as THROUGH
-from ..arithmetic import crossing_time
+from ..exact.segment import BLOCKED as THROUGH
+from ..exact.segment import crossing_time
 from ..exact.sightline import Sight, Sightlines
+from ..exact.trace import Links, portal_path
 from .embree import Candidates
-from .trace import Links, portal_path
 from .witness import Witnesses, passes_portals
 
 # How far past a float32 hit the exact crossing is sought: float32 hits are good to about 1e-6.

@@ -68,10 +68,14 @@ def _segment_segment(p: wp.vec3d, d: wp.vec3d, q: wp.vec3d, e: wp.vec3d):
 
 @wp.kernel
 def nearest_objects(
-    origins: wp.array[wp.vec3d], ends: wp.array[wp.vec3d], targets: wp.array[int],
-    triangles: wp.array2d[wp.vec3d], owners: wp.array[int],
-    distances_out: wp.array2d[wp.float64], objects_out: wp.array2d[int],
-):  # fmt: skip
+    origins: wp.array[wp.vec3d],
+    ends: wp.array[wp.vec3d],
+    targets: wp.array[int],
+    triangles: wp.array2d[wp.vec3d],
+    owners: wp.array[int],
+    distances_out: wp.array2d[wp.float64],
+    objects_out: wp.array2d[int],
+):
     """The NEAREST objects to each segment that are not its target, by squared distance; ascending."""
     row = wp.tid()
     p = origins[row]

@@ -17,9 +17,15 @@ def inverse(value: float) -> float:
 
 @wp.kernel
 def find_crossed(
-    tree: wp.uint64, origins: wp.array[wp.vec3], directions: wp.array[wp.vec3], reach: wp.array[float],
-    rows: wp.array[int], boxes: wp.array2d[wp.vec3], wanted: wp.array2d[wp.bool], crossed_out: wp.array[int],
-):  # fmt: skip
+    tree: wp.uint64,
+    origins: wp.array[wp.vec3],
+    directions: wp.array[wp.vec3],
+    reach: wp.array[float],
+    rows: wp.array[int],
+    boxes: wp.array2d[wp.vec3],
+    wanted: wp.array2d[wp.bool],
+    crossed_out: wp.array[int],
+):
     """The wanted cell of its row that each ray is in for longest before it is stopped; -1 for none."""
     ray = wp.tid()
     row = rows[ray]

@@ -13,7 +13,8 @@ import warp as wp
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
-from .trace import ROUNDS, Links, Maze, Sightings, walk_rays
+from ..exact.trace import Links
+from .sightings import ROUNDS, Maze, Sightings, mark_sightings
 
 wp.set_module_options({"enable_backward": False})
 
@@ -22,11 +23,11 @@ CANDIDATE_CAPACITY = 4096
 GLASS_SHARE = 8
 # Steps of Roberts' R2 sequence.
 R2 = np.array([0.7548776662466927, 0.5698402909980532])
-# Of five rounds through a cell's origins three are stratified. Only the first three are walked through the cells: the
-# walk of all would take verify below 70 % of Embree's rate, and cells are met far more often than small objects.
+# Of five rounds through a cell's origins three are stratified. Only the first three are followed through the cells:
+# following all would take verify below 70 % of Embree's rate, and cells are met far more often than small objects.
 AT_FRONTIER = wp.constant(2)
 AT_OBJECTS = wp.constant(4)
-WALKED_ROUNDS = 3
+CROSSING_ROUNDS = 3
 
 
 @wp.struct
@@ -43,9 +44,12 @@ class Aims:
 
 @wp.kernel
 def aim_rays(
-    aims: Aims, lattice: wp.array[wp.vec3], first: int,
-    origins_out: wp.array[wp.vec3], directions_out: wp.array[wp.vec3],
-):  # fmt: skip
+    aims: Aims,
+    lattice: wp.array[wp.vec3],
+    first: int,
+    origins_out: wp.array[wp.vec3],
+    directions_out: wp.array[wp.vec3],
+):
     """Rays `first` and following of a row: origins in turn, directions from the row's turned lattice or at an aim.
 
     Of five rounds through the origins three are stratified, one is aimed just beyond the potentially visible set and
@@ -145,7 +149,7 @@ class Caster:
     def __post_init__(self):
         self.seen_cells = np.zeros(self.potential_cells.shape, np.uint8)
         self.seen_objects = np.zeros(self.potential_objects.shape, np.uint8)
-        # A ray starts in its own cell, which therefore needs no mark of the walk.
+        # A ray starts in its own cell, which therefore needs no mark.
         self.seen_cells[np.arange(len(self.sources)), self.sources] = 1
         self._lock = threading.Lock()
         self._scene, self._glass_scene = embree_scene(self.opaque[0]), embree_scene(self.glass[0])
@@ -158,7 +162,7 @@ class Caster:
             setattr(self._marks, name, _share(table))
         for name in ("potential_cells", "potential_objects"):
             setattr(self._marks, name, _share(np.ascontiguousarray(getattr(self, name))))
-        self._walked = WALKED_ROUNDS if self._scene is not None else ROUNDS
+        self._crossing = CROSSING_ROUNDS if self._scene is not None else ROUNDS
         self._owners = _share(self.opaque[1].astype(np.int32) if len(self.opaque[1]) else np.zeros(1, np.int32))
         self._sources = _share(self.sources.astype(np.int32))
 
@@ -203,9 +207,11 @@ class Caster:
         reach, hits = self.embree(origins, directions)
         found, count = np.zeros((CANDIDATE_CAPACITY, 4), np.int32), np.zeros(1, np.int32)
         rays = [_share(origins, wp.vec3), _share(directions, wp.vec3), _share(reach)]
-        rounds = [self._aims.spot_counts, first, self._walked]
+        rounds = [self._aims.spot_counts, first, self._crossing]
         inputs = [self._maze, self._sources, run, *rounds, *rays, self._owners, _share(hits), self._marks]
-        wp.launch(walk_rays, len(self.sources), inputs=inputs, outputs=[_share(found), _share(count)], device="cpu")
+        wp.launch(
+            mark_sightings, len(self.sources), inputs=inputs, outputs=[_share(found), _share(count)], device="cpu"
+        )
         found = found[: count[0]]
         if self._glass_scene is not None:
             found = np.concatenate([found, self._look_through_glass(origins, directions, reach, run)])
@@ -230,10 +236,10 @@ class Caster:
         return np.column_stack([rows[once], np.ones(len(once)), objects[once], part[once]]).astype(np.int32)
 
     def cell_rays(self, total: int) -> int:
-        """How many of the first `total` rays of every row are walked through the cells; a bare graph's all are."""
+        """How many of the first `total` rays of every row are followed through the cells; a bare graph's all are."""
         spots = np.array([len(own) for own in self.spots])
         whole, rest = np.divmod(total, ROUNDS * spots)
-        return int((whole * self._walked * spots + np.minimum(rest, self._walked * spots)).sum())
+        return int((whole * self._crossing * spots + np.minimum(rest, self._crossing * spots)).sum())
 
     def raw_rate(self, first: int, run: int) -> float:
         """Rays a second of Embree alone, on two batches of the same rays and two threads."""

@@ -60,9 +60,14 @@ class EdgeTable:
 
 @wp.kernel
 def pass_edges(
-    edges: EdgeTable, origins: wp.array[wp.vec3], ends: wp.array[wp.vec3], blockers: wp.array[int],
-    steps: wp.array[float], seed: int, past_out: wp.array[wp.vec3],
-):  # fmt: skip
+    edges: EdgeTable,
+    origins: wp.array[wp.vec3],
+    ends: wp.array[wp.vec3],
+    blockers: wp.array[int],
+    steps: wp.array[float],
+    seed: int,
+    past_out: wp.array[wp.vec3],
+):
     """A point `steps` outside the nearest to each ray of `EDGES` random edges of its blocker; its end without edges."""
     ray = wp.tid()
     first = edges.first[blockers[ray]]

@@ -11,7 +11,7 @@ from ...data.store.scene_folder import read_table
 from .guide import Hints
 
 if TYPE_CHECKING:
-    from ...data.store.database import Bake
+    from ...data.store.bake_folder import BakeFolder
 
 # Widths by which the crossing of a shaft is tried wider [grid steps, powers of 2].
 WIDTHS = 2.0 ** np.arange(14)
@@ -22,7 +22,7 @@ ENDS = np.array(list(product(range(8), repeat=2))).T
 SIDES = np.array(list(product((0, 1), repeat=3)))
 
 
-def certificate_hints(bake: "Bake", sources: np.ndarray, count: int = 4096) -> Hints:
+def certificate_hints(bake: "BakeFolder", sources: np.ndarray, count: int = 4096) -> Hints:
     """Sightlines of the leaves, and of the line trees of one blocker, that are covered with the smallest margin.
 
     The margin of a leaf is how far its sightlines pass from where the occluder ends. Rectangles of one region that
@@ -72,7 +72,7 @@ def certificate_hints(bake: "Bake", sources: np.ndarray, count: int = 4096) -> H
     return Hints(rows[best], origins[best], ends[best])
 
 
-def _alone(bake: "Bake") -> dict[int, int]:
+def _alone(bake: "BakeFolder") -> dict[int, int]:
     """Blocker by proof of the line trees that name a single one."""
     trees = read_table(bake.folder / "trees.parquet", TREES)
     blockers = [{word // NODE_STEP for word in words if word >= 0} for words in trees["words"].to_pylist()]

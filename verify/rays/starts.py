@@ -5,7 +5,7 @@ from scipy.sparse import csr_array
 
 from ...data.graph import CellGraph
 from ..exact.sightline import Sightlines
-from .trace import Links
+from ..exact.trace import Links
 
 ORIGINS_MOST = 256
 

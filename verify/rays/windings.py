@@ -56,93 +56,132 @@ def _random_unit(state: wp.uint32, more: wp.uint32):
     return wp.vec3d(radius * wp.cos(angle), radius * wp.sin(angle), height)
 
 
+@wp.struct
+class Line:
+    """A line from a winding of a leaf into the leaf behind it."""
+
+    origin: wp.vec3d
+    way: wp.vec3d
+    # Distance from the nearest edge of every winding crossed so far.
+    margin: wp.float64
+    behind: int
+
+
+@wp.func
+def _draw_winding(windings: Windings, leaf: int, share: wp.float64) -> int:
+    """A winding of the leaf, by area; share from 0 to 1."""
+    first, last = windings.leaf_starts[leaf], windings.leaf_starts[leaf + 1]
+    left = wp.float64(0.0)
+    for k in range(first, last):
+        left += windings.areas[windings.leaf_windings[k]]
+    left *= share
+    slot = int(first)
+    while slot < last - 1 and left > windings.areas[windings.leaf_windings[slot]]:
+        left -= windings.areas[windings.leaf_windings[slot]]
+        slot += 1
+    return windings.leaf_windings[slot]
+
+
+@wp.func
+def _draw_line(windings: Windings, leaf: int, seed: int, number: int) -> Line:
+    """A random line out of the leaf; without margin if it is too slanted to follow."""
+    state = wp.rand_init(seed, number)
+    # `randf` advances its own copy of the state in a function, so each draw gets a state of its own.
+    one, two = wp.rand_init(seed + 1, number), wp.rand_init(seed + 2, number)
+    three, four = wp.rand_init(seed + 3, number), wp.rand_init(seed + 4, number)
+    winding = _draw_winding(windings, leaf, wp.float64(wp.randf(state)))
+    start = windings.edge_starts[winding]
+    corners = windings.edge_starts[winding + 1] - start
+    fan = wp.min(int(wp.randf(one) * float(corners - 2)), corners - 3)
+    s, t = wp.sqrt(wp.float64(wp.randf(two))), wp.float64(wp.randf(three))
+    line = Line()
+    line.origin = windings.corners[start] * (wp.float64(1.0) - s)
+    line.origin += windings.corners[start + fan + 1] * (s * (wp.float64(1.0) - t))
+    line.origin += windings.corners[start + fan + 2] * (s * t)
+    line.way = _random_unit(state, four)
+    line.margin = _clear_by(windings, winding, line.origin)
+    # The plane faces the first leaf; the line goes into the other one.
+    facing = wp.float64(1.0)
+    line.behind = windings.leaves[winding, 0]
+    if line.behind == leaf:
+        line.behind = windings.leaves[winding, 1]
+        facing = wp.float64(-1.0)
+    if wp.dot(windings.normals[winding], line.way) * facing < wp.float64(0.0):
+        line.way = -line.way
+    if wp.abs(wp.dot(windings.normals[winding], line.way)) < SLANT:
+        line.margin = wp.float64(-1.0)
+    return line
+
+
+@wp.func
+def _is_new(targets: wp.array2d[int], leaf: int, found: int, target: int) -> bool:
+    """Whether the target is none of the first `found` of the leaf."""
+    for k in range(found):
+        if targets[leaf, k] == target:
+            return False
+    return True
+
+
+@wp.func
+def _leave(windings: Windings, here: int, line: Line, entered: wp.float64) -> tuple[int, wp.float64, wp.float64]:
+    """The winding by which a line surely leaves a leaf that it entered, -1 if there is none; the time and margin."""
+    for k in range(windings.leaf_starts[here], windings.leaf_starts[here + 1]):
+        winding = windings.leaf_windings[k]
+        slope = wp.dot(windings.normals[winding], line.way)
+        if wp.abs(slope) > SLANT:
+            time = (windings.offsets[winding] - wp.dot(windings.normals[winding], line.origin)) / slope
+            if time > entered + wp.float64(1.0e-6):
+                margin = _clear_by(windings, winding, line.origin + line.way * time)
+                if margin > MARGIN:
+                    return winding, time, margin
+    return -1, entered, line.margin
+
+
 @wp.kernel
-def walk_windings(
-    windings: Windings, lines: int, seed: int, claimed: wp.array2d[wp.bool],
-    seen_out: wp.array2d[wp.uint8], origins_out: wp.array2d[wp.vec3d], directions_out: wp.array2d[wp.vec3d],
-    margins_out: wp.array2d[wp.float64], targets_out: wp.array2d[int],
-):  # fmt: skip
+def follow_windings(
+    windings: Windings,
+    lines: int,
+    seed: int,
+    claimed: wp.array2d[wp.bool],
+    seen_out: wp.array2d[wp.uint8],
+    origins_out: wp.array2d[wp.vec3d],
+    directions_out: wp.array2d[wp.vec3d],
+    margins_out: wp.array2d[wp.float64],
+    targets_out: wp.array2d[int],
+):
     """Follow `lines` random lines from each leaf; of leaves that it sees but does not claim keep a few lines."""
     leaf = wp.tid()
-    first, last = windings.leaf_starts[leaf], windings.leaf_starts[leaf + 1]
     found = int(0)
-    if last > first:
-        whole = wp.float64(0.0)
-        for k in range(first, last):
-            whole += windings.areas[windings.leaf_windings[k]]
-        for number in range(lines):
-            state = wp.rand_init(seed, leaf * lines + number)
-            share = wp.float64(wp.randf(state)) * whole
-            # `randf` advances its own copy of the state in a function, so each draw gets a state of its own.
-            one, two = wp.rand_init(seed + 1, leaf * lines + number), wp.rand_init(seed + 2, leaf * lines + number)
-            three, four = wp.rand_init(seed + 3, leaf * lines + number), wp.rand_init(seed + 4, leaf * lines + number)
-            slot = int(first)
-            while slot < last - 1 and share > windings.areas[windings.leaf_windings[slot]]:
-                share -= windings.areas[windings.leaf_windings[slot]]
-                slot += 1
-            winding = windings.leaf_windings[slot]
-            start = windings.edge_starts[winding]
-            corners = windings.edge_starts[winding + 1] - start
-            fan = wp.min(int(wp.randf(one) * float(corners - 2)), corners - 3)
-            a = windings.corners[start]
-            b = windings.corners[start + fan + 1]
-            c = windings.corners[start + fan + 2]
-            s, t = wp.sqrt(wp.float64(wp.randf(two))), wp.float64(wp.randf(three))
-            origin = a * (wp.float64(1.0) - s) + b * (s * (wp.float64(1.0) - t)) + c * (s * t)
-            way = _random_unit(state, four)
-            margin = _clear_by(windings, winding, origin)
-            beyond = windings.leaves[winding, 0]
-            facing = wp.float64(1.0)
-            if beyond == leaf:
-                beyond = windings.leaves[winding, 1]
-                facing = wp.float64(-1.0)
-            # The plane faces the first leaf; the line goes into `beyond`.
-            if wp.dot(windings.normals[winding], way) * facing < wp.float64(0.0):
-                way = -way
-            if wp.abs(wp.dot(windings.normals[winding], way)) < SLANT:
-                margin = wp.float64(-1.0)
-            here, at = int(beyond), wp.float64(0.0)
-            for _ in range(STEPS):
-                if margin < MARGIN:
-                    break
-                if claimed[leaf, here]:
-                    seen_out[leaf, here] = wp.uint8(1)
-                elif found < targets_out.shape[1]:
-                    known = int(0)
-                    for k in range(found):
-                        if targets_out[leaf, k] == here:
-                            known = 1
-                    if known == 0:
-                        targets_out[leaf, found] = here
-                        origins_out[leaf, found] = origin
-                        directions_out[leaf, found] = way
-                        margins_out[leaf, found] = margin
-                        found += 1
-                left = int(-1)
-                for k in range(windings.leaf_starts[here], windings.leaf_starts[here + 1]):
-                    other = windings.leaf_windings[k]
-                    slope = wp.dot(windings.normals[other], way)
-                    if wp.abs(slope) > SLANT:
-                        time = (windings.offsets[other] - wp.dot(windings.normals[other], origin)) / slope
-                        if time > at + wp.float64(1.0e-6):
-                            inside = _clear_by(windings, other, origin + way * time)
-                            if inside > MARGIN:
-                                left = other
-                                at = time
-                                margin = wp.min(margin, inside)
-                                break
-                if left < 0:
-                    break
-                here = windings.leaves[left, 0] + windings.leaves[left, 1] - here
-                if here == leaf:
-                    break
+    if windings.leaf_starts[leaf + 1] == windings.leaf_starts[leaf]:
+        return
+    for number in range(lines):
+        line = _draw_line(windings, leaf, seed, leaf * lines + number)
+        here, at = int(line.behind), wp.float64(0.0)
+        for _ in range(STEPS):
+            if here < 0 or here == leaf or line.margin < MARGIN:
+                break
+            if claimed[leaf, here]:
+                seen_out[leaf, here] = wp.uint8(1)
+            elif found < targets_out.shape[1] and _is_new(targets_out, leaf, found, here):
+                targets_out[leaf, found] = here
+                origins_out[leaf, found] = line.origin
+                directions_out[leaf, found] = line.way
+                margins_out[leaf, found] = line.margin
+                found += 1
+            winding, time, margin = _leave(windings, here, line, at)
+            if winding < 0:
+                here = -1
+            else:
+                here = windings.leaves[winding, 0] + windings.leaves[winding, 1] - here
+                line.margin = wp.min(line.margin, margin)
+                at = time
 
 
 # Wrong-hidden leaves kept of one leaf in one launch.
 KEPT = 64
 
 
-class WindingWalk:
+class WindingLines:
     """Random lines through a map's windings."""
 
     def __init__(self, portals: LeafPortals):
@@ -170,7 +209,7 @@ class WindingWalk:
         out += [wp.array(points, dtype=wp.vec3d, device="cpu", copy=False) for points in (origins, directions)]
         out += [wp.array(values, device="cpu", copy=False) for values in (margins, targets)]
         allowed = wp.array(np.ascontiguousarray(claimed), dtype=wp.bool, device="cpu")
-        wp.launch(walk_windings, count, inputs=[self._windings, lines, seed, allowed], outputs=out, device="cpu")
+        wp.launch(follow_windings, count, inputs=[self._windings, lines, seed, allowed], outputs=out, device="cpu")
         suspects = [
             (int(leaf), int(targets[leaf, k]), origins[leaf, k], directions[leaf, k], float(margins[leaf, k]))
             for leaf, k in np.argwhere(targets >= 0)

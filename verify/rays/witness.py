@@ -20,7 +20,7 @@ PROLONGED = 1.001
 CHUNK = 100_000
 
 if TYPE_CHECKING:
-    from ...data.store.database import Bake
+    from ...data.store.bake_folder import BakeFolder
 
 REASONS = (
     "confirmed",
@@ -91,7 +91,7 @@ def visible_rows(table: pa.Table) -> pa.Table:
     return table.filter(pc.equal(pc.cast(table["verdict"], pa.string()), "visible"))
 
 
-def witnessed_objects(bake: "Bake") -> np.ndarray:
+def witnessed_objects(bake: "BakeFolder") -> np.ndarray:
     """Objects with a witness, shape (cells, objects), bool."""
     rows, out = visible_rows(bake.cell_to_object), np.zeros_like(bake.potential_objects)
     out[rows["cell_id"].to_numpy(), rows["object_id"].to_numpy()] = True

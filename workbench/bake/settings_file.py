@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ...data.errors import InputError
 from ...data.store.scene_folder import one_line
-from .run import Settings
+from .settings import Settings
 
 # What a bake takes from a tune file and stores in its manifest.
 KEPT = ("lod",)

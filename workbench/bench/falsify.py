@@ -24,19 +24,18 @@ import numpy as np
 from ...data.buildings.office import make_office
 from ...data.errors import InputError
 from ...data.readers import read
-from ...data.store.database import load
-from ...verify.findings import VerifyResult
+from ...data.store.bake_folder import read_bake
 from ...verify.rays.adjudicate import Judge, Judgement, sightline_end
 from ...verify.rays.embree import Candidates, Caster, embree_scene
 from ...verify.rays.falsify import SHARES, Falsifier
 from ...verify.rays.starts import ORIGINS_MOST, cell_origins
 from ...verify.rays.witness import visible_rows
 from ..bake.run import bake
-from ..verify import _make_caster, make_judge
+from ..verify import make_caster, make_judge
 from .timing import commit, print_head, print_row, quiet
 
 if TYPE_CHECKING:
-    from ...data.store.database import Bake
+    from ...data.store.bake_folder import BakeFolder
 
 # Decades of solid angle [powers of 10 sr]; the last is open.
 DECADES = (-8, -7, -6, -5, -4, -3, -2)
@@ -64,7 +63,7 @@ class Setting:
         spots: free points of each.
     """
 
-    bake: "Bake"
+    bake: "BakeFolder"
     judge: Judge
     sources: np.ndarray
     spots: list[np.ndarray]
@@ -82,7 +81,7 @@ class Omissions:
         return Omissions(self.rows[chosen], self.objects[chosen], self.solid_angles[chosen])
 
 
-def prepare(made: "Bake", seed: int) -> Setting:
+def prepare(made: "BakeFolder", seed: int) -> Setting:
     """The bake's view cells that have a free point."""
     judge, sources = make_judge(made), np.flatnonzero(made.graph.inhabitable)
     spots = cell_origins(made.graph, sources, ORIGINS_MOST, judge.lines, seed)
@@ -190,14 +189,12 @@ def searches(setting: Setting, seed: int) -> dict[str, Search]:
         return search
 
     def verify_mix(claimed: np.ndarray, rays: int) -> Iterator[tuple[Candidates, int]]:
-        true = setting.bake.potential_objects
-        planted = true.copy()
+        planted = setting.bake.potential_objects.copy()
         planted[setting.sources] = claimed
-        setting.bake.__dict__["potential_objects"] = planted
-        caster, sources = _make_caster(setting.bake, setting.judge, setting.sources, rays, seed, VerifyResult())
-        setting.bake.__dict__["potential_objects"] = true
+        claims = setting.bake.potential_cells, planted
+        caster, _ = make_caster(setting.bake, setting.judge, claims, rays, seed)
         caster.cast(0, 1)
-        return in_turn(caster, len(sources), rays)
+        return in_turn(caster, len(caster.sources), rays)
 
     without = {f"without {name}": guided({**SHARES, name: 0.0}) for name in SHARES if name != "uniform"}
     return {"uniform": guided({"uniform": 1.0}), "verify": verify_mix, "falsifier": guided(SHARES), **without}
@@ -349,7 +346,7 @@ def print_single(setting: Setting, planted: Omissions, together: Outcome, option
         print(f"median of alone / together: {np.median(ratios):.2f}")
 
 
-def compare(made: "Bake", name: str, options: argparse.Namespace) -> None:
+def compare(made: "BakeFolder", name: str, options: argparse.Namespace) -> None:
     """Grade, plant, search and print for one bake."""
     setting = prepare(made, options.seed)
     pairs, dropped = graded_pairs(setting, options.seed)
@@ -385,7 +382,7 @@ def main(arguments: list[str] | None = None) -> int:
     quiet()
     try:
         for folder in options.bake:
-            compare(load(folder), Path(folder).name, options)
+            compare(read_bake(folder), Path(folder).name, options)
         for scene in options.scenes or ([] if options.bake else ["office"]):
             with tempfile.TemporaryDirectory() as folder:
                 model = make_office() if scene == "office" else read(scene)

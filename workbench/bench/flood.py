@@ -13,10 +13,11 @@ import numpy as np
 
 from ...data.errors import InputError
 from ...data.graph import CellGraph
-from ...data.store.database import VisibleRows
+from ...data.rows import Rows
 from ...data.store.graph_folder import read_graph
 from ...kernels.flood import launch_flood
-from ...solvers.visibility.engine import Engine
+from ...kernels.launch import Device
+from ...solvers.visibility.graph_engine import GraphEngine
 from .timing import commit, median_range, print_head, print_row, quiet
 
 REPEATS = 7
@@ -43,7 +44,7 @@ HEAD = (
 )
 
 
-def asymmetric(rows: VisibleRows, graph: CellGraph) -> int:
+def asymmetric(rows: Rows, graph: CellGraph) -> int:
     """Pairs of inhabitable cells of which just one sees the other."""
     potential = np.zeros((graph.cell_count, graph.cell_count), bool)
     potential[rows.source, rows.target] = True
@@ -51,9 +52,9 @@ def asymmetric(rows: VisibleRows, graph: CellGraph) -> int:
     return int((potential != potential.T).sum()) // 2
 
 
-def timed_floods(graph: CellGraph, repeats: int) -> tuple[dict[int, list[float]], VisibleRows]:
+def timed_floods(graph: CellGraph, repeats: int) -> tuple[dict[int, list[float]], Rows]:
     """Seconds of the visibility phase by thread count, in turn, after one run to warm up; and the rows found."""
-    engines = {t: Engine(None, graph, None, seed=0, threads=t, device="cpu") for t in THREADS}
+    engines = {t: GraphEngine(graph, device=Device(threads=t)) for t in THREADS}
     sources = np.flatnonzero(graph.inhabitable)
     spent: dict[int, list[float]] = {t: [] for t in THREADS}
     for engine in engines.values():
@@ -73,7 +74,7 @@ def timed_floods(graph: CellGraph, repeats: int) -> tuple[dict[int, list[float]]
 
 def plain_search(graph: CellGraph, limit_s: float) -> tuple[float, int, int]:
     """Seconds of the portal-sequence search alone on one thread, the sources searched, and those cut by the cap."""
-    device_graph = Engine(None, graph, None, seed=0, threads=1, device="cpu").model.device_graph
+    device_graph = GraphEngine(graph).model.device_graph
     sources = np.flatnonzero(graph.inhabitable)
     # A line can be followed either way, so when every cell is a source, half the octants find every pair.
     octants = (0, 2, 4, 6) if len(sources) == graph.cell_count else tuple(range(8))
@@ -99,7 +100,7 @@ def bench(folder: Path, repeats: int, limit_s: float) -> list[object]:
     spent, rows = timed_floods(graph, repeats)
     one, two = (statistics.median(spent[t]) for t in THREADS)
     seconds, searched, cut = plain_search(graph, limit_s)
-    pairs = len(rows.source)
+    pairs = len(rows)
     return [
         folder.resolve().name,
         graph.cell_count,

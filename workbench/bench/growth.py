@@ -8,12 +8,14 @@ from functools import partial
 import numpy as np
 
 from ...data.buildings.office import make_office
-from ...data.opaque import OpaquePlanes, opaque_planes
-from ...data.scene import Role, Scene
+from ...data.prepared import PreparedModel
+from ...kernels.launch import Device
 from ...kernels.select import launch_select
-from ...kernels.shaft import device_shields, launch_shaft
-from ...solvers.visibility.engine import Engine, Sights, find_occluders
-from ...solvers.visibility.occluders import seen_objects
+from ...kernels.shaft import launch_shaft
+from ...kernels.shields import device_shields
+from ...solvers.visibility.aim import Sights
+from ...solvers.visibility.graph_engine import GraphEngine
+from ...solvers.visibility.occluders import OccluderModel, seen_objects
 from .rows.objects import PIECES, SMALLEST, boxes_in_spaces
 from .rows.portals import random_rooms
 from .select import problem
@@ -66,24 +68,24 @@ def grown(kernel: str, scene: str, counts: dict[str, list[int]], ms: list[float]
     return [Growth(kernel, scene, name, sizes, ms, *fit(sizes, ms)) for name, sizes in counts.items()]
 
 
-def run_growth(device: str, advance: Callable[[], None]) -> Iterator[list[Growth]]:
+def run_growth(device: Device, advance: Callable[[], None]) -> Iterator[list[Growth]]:
     """All curves; `advance` is called after every size."""
     for curve in CURVES:
         yield curve(device, advance)
 
 
-def median_ms(work: Callable[[], object], device: str) -> float:
+def median_ms(work: Callable[[], object], device: Device) -> float:
     """Median of RUNS runs after one to warm up."""
     work()
     return statistics.median(clock(work, device)[0] for _ in range(RUNS))
 
 
-def flood_growth(device: str, advance: Callable[[], None]) -> list[Growth]:
+def flood_growth(device: Device, advance: Callable[[], None]) -> list[Growth]:
     """All cells from all cells of random rooms, against cells and portals."""
     counts, ms = {"cells": [], "portals": []}, []
     for cells in CELLS:
         graph = random_rooms(cells, seed=cells)
-        engine = Engine(None, graph, None, seed=0, threads=1, device=device)
+        engine = GraphEngine(graph, device=device)
         ms.append(median_ms(partial(engine.visible, np.arange(graph.cell_count)), device))
         counts["cells"].append(graph.cell_count)
         counts["portals"].append(graph.portal_count)
@@ -91,37 +93,30 @@ def flood_growth(device: str, advance: Callable[[], None]) -> list[Growth]:
     return grown("flood", "random rooms, all pairs", counts, ms)
 
 
-def shaft_growth(device: str, advance: Callable[[], None]) -> list[Growth]:
+def shaft_growth(device: Device, advance: Callable[[], None]) -> list[Growth]:
     """A fixed number of pairs in ever larger offices, against rectangles that occlude."""
     counts, ms = {"occluders": []}, []
     for floors, rooms in OFFICES:
         scene = make_office(floors=floors, rooms_per_side=rooms, seed=4)
-        regions, patches = find_occluders(scene, occluding_planes(scene))
-        shields = device_shields(regions, patches, device)
+        model = PreparedModel(scene)
+        shields = device_shields(model.regions, model.patches, device)
         random = np.random.default_rng(0)
         boxes = [boxes_in_spaces(random, PAIRS, sides, scene) for sides in ((0.5, 1.5), (0.1, 0.6))]
         rows = np.arange(2 * PAIRS).reshape(2, PAIRS).T
         work = partial(launch_shaft, shields, np.concatenate(boxes), rows, smallest=SMALLEST, cap=PIECES, device=device)
         ms.append(median_ms(work, device))
-        counts["occluders"].append(len(regions.boxes) + len(patches.area))
+        counts["occluders"].append(len(model.regions.boxes) + len(model.patches.area))
         advance()
     return grown("shaft", f"offices, {PAIRS:,} pairs", counts, ms)
 
 
-def occluding_planes(scene: Scene) -> OpaquePlanes:
-    """Opaque rectangles of a model's occluders."""
-    triangles, owners = scene.triangles()
-    return opaque_planes(triangles[scene.object_mask(Role.OCCLUDER)[owners]])
-
-
-def occlusion_growth(device: str, advance: Callable[[], None]) -> list[Growth]:
+def occlusion_growth(device: Device, advance: Callable[[], None]) -> list[Growth]:
     """What a few view cells of ever larger offices see, against objects and triangles."""
     counts, ms = {"objects": [], "triangles": []}, []
     for floors, rooms in OFFICES:
         scene = make_office(floors=floors, rooms_per_side=rooms, seed=4)
         cells = boxes_in_spaces(np.random.default_rng(0), VIEW_CELLS, (1.0, 2.0), scene)
-        sights = Sights(scene, occluding_planes(scene), cells, device)
-        model, _ = sights.occlusion(scene, cells, 0, 1, device)
+        model = OccluderModel.of(Sights.of(PreparedModel(scene), cells, 0, device))
         ms.append(median_ms(partial(seen_objects, model, np.arange(VIEW_CELLS)), device))
         counts["objects"].append(len(scene.objects))
         counts["triangles"].append(len(scene.triangles()[0]))
@@ -129,7 +124,7 @@ def occlusion_growth(device: str, advance: Callable[[], None]) -> list[Growth]:
     return grown("occlusion", f"offices, {VIEW_CELLS} cells", counts, ms)
 
 
-def select_growth(device: str, advance: Callable[[], None]) -> list[Growth]:
+def select_growth(device: Device, advance: Callable[[], None]) -> list[Growth]:
     """One frame's selection, against objects."""
     ms = []
     for objects in OBJECTS:

@@ -17,7 +17,7 @@ from ...data.errors import InputError
 from ...data.readers import read
 from ...data.scene import Definition, Scene
 from ...kernels import deviation
-from ...kernels.launch import thread_count
+from ...kernels.launch import Device
 from ...solvers.levels.chain import COARSEST, lod_chain, with_lods
 from .timing import commit, print_head, print_row, quiet
 
@@ -41,7 +41,8 @@ def columns(name: str, scene: Scene) -> list[object]:
     """One row of the table; compile time excluded."""
     scene = replace(scene, definitions=[Definition(shape.name, shape.lods[:1]) for shape in scene.definitions])
     start = time.perf_counter()
-    made, _ = with_lods(scene)
+    device = Device.wanted("cpu")
+    made, _ = with_lods(scene, device=device)
     seconds = time.perf_counter() - start
     large = [shape for shape in scene.definitions if len(shape.lods[0].faces) > COARSEST]
     chains = [lod_chain(shape.lods[0]) for shape in large]
@@ -60,7 +61,7 @@ def columns(name: str, scene: Scene) -> list[object]:
         len(scene.definitions),
         len(large),
         f"{seconds:.2f}",
-        thread_count(None),
+        device.threads,
         ", ".join(f"{sum(len(mesh.faces) for mesh in level):,} ({len(level)})" for level in levels),
         f"{statistics.median(ratios):.4f}" if ratios else "-",
         f"{max(ratios):.4f}" if ratios else "-",

@@ -10,13 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import bake, verify
+from ... import bake
+from ...data.blockers import find_blockers
 from ...data.errors import InputError
-from ...data.opaque import opaque_planes
-from ...data.scene import Role
-from ...data.store.database import Bake
-from ...solvers.visibility.cells import search_rounds
-from ...solvers.visibility.engine import Engine
+from ...data.prepared import PreparedModel
+from ...data.store.bake_folder import BakeFolder
+from ...data.verdict import Verdict
+from ...kernels.blockers import blocker_tree
+from ...kernels.launch import Device
+from ...solvers.visibility.search import search_rounds
 from ...verify.findings import Counts, VerifyResult
 from .timing import commit, print_head, print_row, quiet
 
@@ -42,19 +44,15 @@ HEAD = (
 )
 
 
-def undecided_percent(made: Bake) -> float:
+def undecided_percent(made: BakeFolder) -> float:
     """Pairs (inhabitable cell, cell) that the target search gives up on, and that have no witness [% of all pairs]."""
-    scene, graph = made.scene, made.graph
-    opaque = None
-    if scene is not None:
-        triangles, owners = scene.triangles()
-        opaque = opaque_planes(triangles[scene.object_mask(Role.OCCLUDER)[owners]])
-    engine = Engine(scene, graph, opaque, seed=0, threads=2, device="cpu")
+    graph = made.graph
+    blockers = find_blockers(graph) if made.scene is None else PreparedModel(made.scene).blockers(graph)
     table = made.cell_to_cell
     unknown = np.array([str(verdict) == "unknown" for verdict in table["verdict"].to_pylist()], bool)
     source, target = (table[name].to_numpy()[unknown] for name in ("cell_id", "reached_cell_id"))
     pairs = np.column_stack([source, target, np.zeros(len(source), int)])[source != target]
-    given_up = search_rounds(engine.model, graph.cells, pairs).verdict == 2 if len(pairs) else np.zeros(0, bool)
+    given_up = search_rounds(blocker_tree(blockers), graph.cells, pairs, Device(threads=2)).verdict == Verdict.UNKNOWN
     return 100.0 * float(given_up.sum()) / (int(graph.inhabitable.sum()) * graph.cell_count)
 
 
@@ -63,7 +61,7 @@ def together(counts: list[Counts]) -> Counts:
     return Counts("all", sum(c.potential for c in counts), sum(c.seen for c in counts), sum(c.by_rays for c in counts))
 
 
-def columns(name: str, made: Bake, result: VerifyResult) -> list[object]:
+def columns(name: str, made: BakeFolder, result: VerifyResult) -> list[object]:
     """One row of the table."""
     facts, objects = made.manifest, result.counts[-1]
     cells = together(result.counts[:-1])
@@ -98,7 +96,7 @@ def main(argv: list[str] | None = None) -> int:
         for model in options.models:
             with tempfile.TemporaryDirectory() as scratch:
                 made = bake(model, Path(scratch) / f"{model.stem}.bake")
-                result = verify(made, rays=options.rays)
+                result = made.verify(rays=options.rays)
                 print_row(columns(model.name, made, result))
                 stood &= result.ok
     except InputError as error:

@@ -15,19 +15,22 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import bake, verify
+from ... import bake
 from ...data.buildings.office import make_office
 from ...data.errors import InputError
+from ...data.prepared import PreparedModel
 from ...data.readers import read
-from ...data.scene import Role, Scene
+from ...data.scene import OPAQUE, Scene
 from ...data.solids import triangles_meet_boxes
-from ...data.view_cells import as_graph, model_bounds, write_view_cells
+from ...data.store.view_cells import write_view_cells
+from ...data.verdict import Verdict
+from ...kernels.launch import CPU
 from ...kernels.shaft import launch_shaft
-from ...solvers.visibility.engine import Sights
-from ...solvers.visibility.occluders import Occlusion, seen_objects
-from ...solvers.visibility.projection import VlodSettings, join_outlines, rectangle_outlines, vlod_hidden
+from ...solvers.visibility.aim import Sights
+from ...solvers.visibility.occluders import OccluderModel, seen_objects
+from ...solvers.visibility.projection import VlodSettings, vlod_hidden
 from ...verify.rays.witness import witnessed_objects
-from ..bake.run import Settings, opaque_rectangles
+from ..bake.settings import Settings
 from ..verify import seen_by_rays
 from .timing import commit, print_head, print_row, quiet
 
@@ -53,9 +56,8 @@ def sample_cells(scene: Scene, count: int, seed: int = 0) -> tuple[np.ndarray, n
     Raises:
         InputError: no such place was found.
     """
-    triangles, owners = scene.triangles()
-    solid = triangles[scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]]
-    low, high = model_bounds(scene)
+    solid, _ = scene.triangles(*OPAQUE)
+    low, high = scene.bounds()
     side = round(CELL_M / scene.grid_m)
     random = np.random.default_rng(seed)
     bounds = np.stack([solid.min(axis=1), solid.max(axis=1)], axis=1)
@@ -98,13 +100,11 @@ def _grown(box: np.ndarray, free: Callable[[np.ndarray], bool], grid_m: float) -
     return box
 
 
-def variants(scene: Scene, model: Occlusion, occluders: tuple) -> dict[str, Variant]:
+def variants(model: OccluderModel) -> dict[str, Variant]:
     """The methods to compare, by title."""
-    occludees, count = model.occludees, len(scene.objects)
-    regions, patches = occluders
-    owners = np.repeat(np.arange(count), np.diff(occludees.starts))
+    scene, outlines = model.sights.model.scene, model.sights.model.outlines
+    occludees, owners, count = model.occludees, model.occludees.owners, len(scene.objects)
     present = np.flatnonzero(np.diff(occludees.starts))
-    outlines = join_outlines(rectangle_outlines(regions.boxes), patches)
 
     def by_shaft(boxes: np.ndarray, of: np.ndarray, smallest: int, cap: int) -> Variant:
         def hidden(cells: np.ndarray) -> np.ndarray:
@@ -116,7 +116,7 @@ def variants(scene: Scene, model: Occlusion, occluders: tuple) -> dict[str, Vari
                 everything = np.concatenate([model.cells[cell : cell + 1], boxes[~meet]])
                 rows = np.column_stack([np.zeros((~meet).sum(), int), np.arange(1, len(everything))])
                 verdict = launch_shaft(model.shields, everything, rows, smallest=(smallest, smallest), cap=cap).verdict
-                out[row, of[~meet][verdict != 0]] = False
+                out[row, of[~meet][verdict != Verdict.HIDDEN]] = False
             return out
 
         return hidden
@@ -162,18 +162,17 @@ def compare(scene: Scene, name: str, count: int, rays: int, only: str) -> None:
     """Print the table of one model."""
     small, rooms = sample_cells(scene, count)
     cells = np.concatenate([small, rooms])
-    opaque = opaque_rectangles(scene)
-    sights = Sights(scene, opaque, cells, "cpu")
-    model, occluders = sights.occlusion(scene, as_graph(cells).cells, 0, 1, "cpu")
+    prepared = PreparedModel(scene)
+    model = OccluderModel.of(Sights.of(prepared, cells, 0, CPU))
     seen = np.zeros((len(cells), len(scene.objects)), bool)
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / "cells.csv"
         write_view_cells(cells, scene, table)
         made = bake(scene, Path(folder) / "cells.bake", settings=Settings(method="occluders", cells=str(table)))
-        result = verify(made, rays=rays)
+        result = made.verify(rays=rays)
         seen |= witnessed_objects(made)
         seen |= seen_by_rays(made, rays, 1)[1]
-    regions, patches = occluders
+    regions, patches = prepared.regions, prepared.patches
     found = f"seen {seen[:count].sum():,} / {seen[count:].sum():,}"
     checked = f"{result.rays:,} rays, {result.wrong_hidden} wrong hidden, {result.refuted} refuted"
     print(
@@ -182,7 +181,7 @@ def compare(scene: Scene, name: str, count: int, rays: int, only: str) -> None:
         flush=True,
     )
     print_head(HEAD)
-    for title, hidden in variants(scene, model, occluders).items():
+    for title, hidden in variants(model).items():
         if only and not any(title.startswith(start) for start in only.split(",")):
             continue
         hidden(np.arange(1))

@@ -21,21 +21,18 @@ from ...data.buildings.plant import make_plant
 from ...data.buildings.statistics import level_statistics
 from ...data.camera import CameraPath, Screen
 from ...data.incidence import populate
-from ...data.occludees import find_occludees
-from ...data.scene import Role, Scene
+from ...data.prepared import PreparedModel
+from ...data.scene import OPAQUE, Scene
 from ...data.store.scene_folder import write_scene
-from ...data.view_cells import write_view_cells
+from ...data.store.view_cells import write_view_cells
 from ...solvers.levels.benefit import find_sightings
-from ...solvers.visibility.engine import find_occluders, with_details
 from ...solvers.visibility.projection import (
     VlodSettings,
     VlodStats,
-    join_outlines,
-    rectangle_outlines,
     split_cell,
     vlod_hidden,
 )
-from ..bake.run import Settings, opaque_rectangles
+from ..bake.settings import Settings
 from ..walk.path import potential_on, walk
 from .occlusion import sample_cells
 from .timing import commit, quiet
@@ -172,21 +169,20 @@ def vlod(folder: Path) -> dict[str, list[Line]]:
     """Chhugani et al. 2005, on a synthetic process plant of another size."""
     scene = make_plant(triangles=PLANT_TRIANGLES)
     cells = plant_cells(scene)
-    regions, patches = find_occluders(scene, with_details(scene, opaque_rectangles(scene)))
-    outlines, occludees = join_outlines(rectangle_outlines(regions.boxes), patches), find_occludees(scene)
-    owners = np.repeat(np.arange(len(scene.objects)), np.diff(occludees.starts))
+    model = PreparedModel(scene)
+    work = cells, model.outlines, model.occludees.pieces, model.occludees.owners
 
     def hidden(settings: VlodSettings) -> tuple[np.ndarray, VlodStats, float]:
-        vlod_hidden(cells, outlines, occludees.pieces, owners, settings, objects=len(scene.objects))
+        vlod_hidden(*work, settings, objects=len(scene.objects))
         begin = time.perf_counter()
-        out, stats = vlod_hidden(cells, outlines, occludees.pieces, owners, settings, objects=len(scene.objects))
+        out, stats = vlod_hidden(*work, settings, objects=len(scene.objects))
         return out, stats, (time.perf_counter() - begin) / len(cells)
 
     best, stats, each = hidden(VlodSettings(CLUSTERS))
     one, random = (hidden(VlodSettings(1, objective))[0] for objective in ("socp", "random"))
     count = len(cells)
     made = bake(scene, folder / "plant.bake", settings=Settings(method="occluders", cells=_table(scene, cells, folder)))
-    triangles = np.bincount(scene.triangles()[1], minlength=len(scene.objects))
+    triangles = scene.triangle_counts
     sampled = sampled_sets(scene, cells)
     change = [
         triangles[made.potential_objects[a] != made.potential_objects[b]].sum() / triangles.sum()
@@ -242,10 +238,9 @@ def _table(scene: Scene, cells: np.ndarray, folder: Path) -> str:
 
 def sampled_sets(scene: Scene, cells: np.ndarray) -> np.ndarray:
     """Objects that rays from 125 points of each view cell hit, shape (cells, objects), bool."""
-    corners, owners = scene.triangles()
-    solid = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
+    corners, owners = scene.triangles(*OPAQUE)
     embree = EmbreeScene(robust=True)
-    vertices = corners[solid].reshape(-1, 3).astype(np.float32)
+    vertices = corners.reshape(-1, 3).astype(np.float32)
     TriangleMesh(embree, vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3))
     directions = np.random.default_rng(0).normal(size=(DIRECTIONS, 3)).astype(np.float32)
     out = np.zeros((len(cells), len(scene.objects)), bool)
@@ -253,7 +248,7 @@ def sampled_sets(scene: Scene, cells: np.ndarray) -> np.ndarray:
     for row, (low, high) in enumerate(cells):
         for eye in low + steps * (high - low):
             hit = embree.run(np.broadcast_to(eye.astype(np.float32), directions.shape).copy(), directions)
-            out[row, owners[solid][hit[hit >= 0]]] = True
+            out[row, owners[hit[hit >= 0]]] = True
     return out
 
 
@@ -280,7 +275,7 @@ def mmr(folder: Path) -> dict[str, list[Line]]:
     cells = plant_cells(scene)[::8][:VIEWS]
     settings = Settings(method="occluders", cells=_table(scene, cells, folder), lods=True)
     made = bake(scene, folder / "views.bake", settings=settings)
-    triangles = np.bincount(scene.triangles()[1], minlength=len(scene.objects))
+    triangles = scene.triangle_counts
     coarser = np.tile(triangles, (len(cells), 1))
     for row in made.cell_lods.to_pylist():
         placed = made.scene.objects[row["object_id"]]

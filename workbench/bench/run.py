@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from ... import __version__
 from ...data.errors import InputError
-from ...kernels.launch import check_device
+from ...kernels.launch import Device
 from ..summary import table
 from . import suite as suites
 from .growth import Growth, growth_steps, run_growth
@@ -92,7 +92,7 @@ class BenchResult:
     def json(self) -> dict[str, Any]:
         """What `--json` writes."""
         return {
-            "machine": machine(self.device),
+            "machine": machine(Device(self.device)),
             "commit": commit(),
             "version": __version__,
             "date": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -145,22 +145,22 @@ def bench(
     unknown = [name for name in only if name not in KERNELS]
     if unknown:
         raise InputError(f"only: expected names among {', '.join(KERNELS)}, found {', '.join(map(repr, unknown))}")
-    check_device(device)
+    where = Device.wanted(device, 1)
     result = BenchResult(suite, device)
     work = [(kernel, n) for kernel in KERNELS if not only or kernel in only for n in suites.SIZES[suite][kernel]]
-    given = graph_cases(Path(graphs), device) if graphs is not None else []
+    given = graph_cases(Path(graphs), where) if graphs is not None else []
     grows = suite == "full" and not only
     steps = len(work) + len(given) + (growth_steps() if grows else 0)
     with tqdm(total=steps, desc="bench", disable=not progress) as bar:
         for kernel, n in work:
             bar.set_postfix_str(kernel)
-            _add(result, [measure(case, device) for case in make_cases(kernel, n, device)])
+            _add(result, [measure(case, where) for case in make_cases(kernel, n, where)])
             bar.update()
         for case in given:
-            _add(result, [measure(case, device)])
+            _add(result, [measure(case, where)])
             bar.update()
         if grows:
-            for curves in run_growth(device, bar.update):
+            for curves in run_growth(where, bar.update):
                 result.growth += curves
     return result
 

@@ -26,7 +26,7 @@ from ...data.buildings.plant import make_plant
 from ...data.errors import InputError
 from ...data.scene import Scene
 from ...data.store.graph_folder import CELL_COLUMNS
-from ..bake.run import Settings
+from ..bake.settings import Settings
 from .timing import commit, quiet
 
 SCENES = {"plant": make_plant, "city": make_city}

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ...kernels.launch import thread_count
+from ...kernels.launch import CPU, Device
 
 # Runs at least of each work; short work is repeated until it has taken this long.
 REPEATS, REPEATS_MOST, SHORT_S = 7, 99, 0.02
@@ -143,7 +143,7 @@ class Row:
     kernel: str
     scene: str
     method: str
-    device: str
+    device: Device
     n: int
     ms_median: float
     ms_min: float
@@ -176,13 +176,13 @@ class Noise:
     q3: float
 
 
-def make_cases(kernel: str, n: int, device: str) -> list[Case]:
+def make_cases(kernel: str, n: int, device: Device) -> list[Case]:
     """Cases of a kernel at one size, on seeded work; several if the kernel has several ways."""
     module = import_module(f".rows.{KERNELS[kernel]}", __package__)
     return getattr(module, f"{kernel}_cases")(n, device)
 
 
-def measure(case: Case, device: str) -> tuple[Row, Noise]:
+def measure(case: Case, device: Device) -> tuple[Row, Noise]:
     """Time and judge one case.
 
     Raises:
@@ -190,7 +190,7 @@ def measure(case: Case, device: str) -> tuple[Row, Noise]:
     """
     start = time.perf_counter()
     for module in case.modules:
-        wp.load_module(module, device=device)
+        wp.load_module(module, device=device.name)
     load_ms = 1e3 * (time.perf_counter() - start)
     first, answer = clock(case.work, device)
     errors = case.judge(answer)
@@ -201,13 +201,13 @@ def measure(case: Case, device: str) -> tuple[Row, Noise]:
         clock(case.work, device)
     times = timed(case.work, device)
     median = statistics.median(times)
-    slow = statistics.median(timed(case.reference, "cpu", limit_s=BASELINE_S)) / case.share
+    slow = statistics.median(timed(case.reference, CPU, limit_s=BASELINE_S)) / case.share
     q1, _, q3 = statistics.quantiles(times, n=4)
     row = Row(
         kernel=case.kernel,
         scene=case.scene,
         method=case.method,
-        device=case.device or device,
+        device=case.device or device.name,
         n=case.n,
         ms_median=median,
         ms_min=min(times),
@@ -221,15 +221,15 @@ def measure(case: Case, device: str) -> tuple[Row, Noise]:
     return row, Noise(q1, q3)
 
 
-def clock(work: Callable[[], Any], device: str) -> tuple[float, Any]:
+def clock(work: Callable[[], Any], device: Device) -> tuple[float, Any]:
     """Milliseconds of one run, until the device is done, and its answer."""
     start = time.perf_counter()
     answer = work()
-    wp.synchronize_device(device)
+    wp.synchronize_device(device.name)
     return 1e3 * (time.perf_counter() - start), answer
 
 
-def timed(work: Callable[[], object], device: str, *, limit_s: float = math.inf) -> list[float]:
+def timed(work: Callable[[], object], device: Device, *, limit_s: float = math.inf) -> list[float]:
     """Milliseconds of REPEATS runs, of more if they are short, of fewer (one at least) if they reach the limit."""
     times: list[float] = []
     gc.collect()
@@ -295,12 +295,12 @@ def _peak_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
 
 
-def machine(device: str) -> str:
+def machine(device: Device) -> str:
     """Processor, cores, system, Python, and a GPU if that is where kernels run."""
-    found = [_processor(), f"{thread_count(None)} cores", platform.system()]
+    found = [_processor(), f"{Device.wanted('cpu').threads} cores", platform.system()]
     found.append(f"Python {platform.python_version()}, Warp {wp.config.version}, NumPy {np.__version__}")
-    if not wp.get_device(device).is_cpu:
-        found.append(wp.get_device(device).name)
+    if not device.is_cpu:
+        found.append(wp.get_device(device.name).name)
     return ", ".join(found)
 
 

@@ -13,18 +13,20 @@ import pyarrow.parquet as pq
 
 from ... import __version__
 from ...data.errors import InputError
-from ...data.store.database import WITNESS
+from ...data.ragged import starts_of
+from ...data.scene import OPAQUE, Role
+from ...data.store.bake_folder import WITNESS
 from ...data.store.graph_folder import CELL_COLUMNS, numbers
 from ...data.store.quake import axial_graph, read_prt
 from ...data.store.scene_folder import FORMAT, new_folder, read_manifest, read_table, replaceable
 from ...data.view_cells import as_graph
 from ...verify.check_result import CheckResult
 from ...verify.exact.sightline import Sightlines
+from ...verify.exact.trace import contact_links
 from ...verify.rays.adjudicate import Judge, Judgement
-from ...verify.rays.trace import contact_links
-from ...verify.rays.windings import WindingWalk
+from ...verify.rays.windings import WindingLines
 from ...verify.rays.witness import Witnesses, confirm_cells
-from .run import opaque_and_glass, open_model
+from .run import open_model
 
 WRONG = ("kind", "cell", "target", *WITNESS, "portals")
 
@@ -150,7 +152,7 @@ def _by_triangles(
     scene = opened[0] if isinstance(opened, tuple) else None
     if scene is None or not np.array_equal(scene.origin, facts["origin"]) or scene.grid_m != facts["grid"]:
         raise InputError(f"{model}: expected a model at {facts['origin']} m, found another")
-    opaque, glass = opaque_and_glass(scene)
+    opaque, glass = scene.triangles(*OPAQUE), scene.triangles(Role.TRANSPARENT)
     judge = Judge(as_graph(boxes), Sightlines(*opaque), Sightlines(*glass), contact_links(boxes))
     clear = np.zeros(rows.num_rows, bool)
     kinds, sources, targets = (np.array(rows[name].to_pylist()) for name in ("kind", "cell", "target"))
@@ -174,7 +176,7 @@ def _by_portals(model: Path, rows: pa.Table, origins: np.ndarray, ends: np.ndarr
         if isinstance(graph, tuple):
             raise InputError(f"{model}: expected a cell graph, found a model with triangles")
     lists = rows["portals"].to_pylist()
-    starts = np.concatenate([[0], np.cumsum([len(part) for part in lists])]).astype(np.int64)
+    starts = starts_of([len(part) for part in lists])
     portals = np.array([k for part in lists for k in part], np.int64)
     sources, targets = (rows[name].to_numpy().astype(np.int64) for name in ("cell", "target"))
     if rows.num_rows and max(sources.max(), targets.max()) >= graph.cell_count:
@@ -184,7 +186,7 @@ def _by_portals(model: Path, rows: pa.Table, origins: np.ndarray, ends: np.ndarr
 
 def _by_windings(model: Path, rows: pa.Table, origins: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Which sightlines pass the windings of an oblique map."""
-    walk = WindingWalk(read_prt(model))
+    walk = WindingLines(read_prt(model))
     pairs = zip(rows["cell"].to_pylist(), rows["target"].to_pylist(), origins, ends, strict=True)
     found = [walk.path(leaf, target, origin, end - origin) is not None for leaf, target, origin, end in pairs]
     return np.array(found, bool)

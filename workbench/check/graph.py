@@ -10,9 +10,9 @@ import pyarrow.parquet as pq
 
 from ...data.graph import CellGraph
 from ...data.scene import GRID_M
+from ...data.store.bake_folder import BakeFolder, cells_table, portals_table
 from ...data.store.claims import read_claims
-from ...data.store.database import Bake, cells_table, portals_table
-from ...data.view_cells import ViewCells
+from ...data.store.view_cells import ViewCells
 from ...verify.check_result import CheckResult, WrongPair
 from ...verify.rays.witness import confirm_cells, read_witnesses, visible_rows
 from ..bake.run import bake
@@ -48,7 +48,7 @@ def check_graph(graph: CellGraph, pvs: Sequence[object], targets: str | None = N
         return _compare(graph, claims.cells, truth, seconds)
 
 
-def _compare(graph: CellGraph, claimed: np.ndarray, truth: Bake, seconds: dict[str, float]) -> CheckResult:
+def _compare(graph: CellGraph, claimed: np.ndarray, truth: BakeFolder, seconds: dict[str, float]) -> CheckResult:
     start = time.perf_counter()
     seen, potential = np.zeros_like(claimed), truth.potential_cells
     rows = visible_rows(truth.cell_to_cell)

@@ -11,10 +11,11 @@ from tqdm import tqdm
 from ...data.errors import InputError
 from ...data.store.claims import read_claims
 from ...data.store.quake import UNIT_STEPS, LeafPortals, axial_graph, check_belongs, is_axial, read_bsp, read_prt
-from ...data.view_cells import ViewCells, as_graph
+from ...data.store.view_cells import ViewCells
+from ...data.view_cells import as_graph
 from ...verify.check_result import CheckResult, WrongPair
 from ...verify.rays.confidence import LEVEL
-from ...verify.rays.windings import WindingWalk
+from ...verify.rays.windings import WindingLines
 from .graph import check_graph
 
 SUFFIXES = (".bsp", ".prt")
@@ -102,7 +103,7 @@ def _follow_lines(
     joined[portals.leaves.ravel()] = True
     result = CheckResult(np.arange(count), np.flatnonzero(joined), [], {"cell": claimed}, {"cell": seen})
     start = time.perf_counter()
-    walk = WindingWalk(portals)
+    walk = WindingLines(portals)
     judging = 0.0
     with tqdm(total=each * count, unit="line", unit_scale=True, disable=not progress) as bar:
         for first in range(0, each, ROUND_LINES):

@@ -11,17 +11,17 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import warp as wp
 from tqdm import tqdm
 
 from ...data.errors import InputError
 from ...data.graph import CellGraph
-from ...data.scene import Role, Scene
+from ...data.scene import OPAQUE, Role, Scene
 from ...data.store.claims import Claims, read_claims
 from ...data.store.scene_folder import read_manifest
-from ...data.view_cells import ViewCells, read_rows, view_cells
+from ...data.store.view_cells import ViewCells, read_rows, view_cells
 from ...verify.check_result import CheckResult, WrongPair, counted
 from ...verify.exact.sightline import Sightlines
+from ...verify.exact.trace import contact_links
 from ...verify.rays.adjudicate import Judge, Judgement, sightline_end
 from ...verify.rays.clearance import clearances
 from ...verify.rays.confidence import Confidence
@@ -29,7 +29,6 @@ from ...verify.rays.embree import Candidates
 from ...verify.rays.falsify import Falsifier
 from ...verify.rays.second_look import SecondLook
 from ...verify.rays.starts import ORIGINS_MOST, cell_origins
-from ...verify.rays.trace import contact_links
 
 RAYS = 4_000_000
 # Sightlines whose surroundings are measured; it takes about a millisecond each.
@@ -77,8 +76,6 @@ def check(
     """
     if rays < 1:
         raise InputError(f"rays: expected 1 or more, found {rays}")
-    # Warp greets whoever starts it, unless told not to before.
-    wp.config.log_level = wp.LOG_WARNING
     start = time.perf_counter()
     if isinstance(model, str | Path) and Path(model).suffix.lower() in (".bsp", ".prt"):
         from .map import check_map
@@ -157,20 +154,13 @@ def open_model(
 
         return read_graph(path)[0]
     if path.is_dir() and read_kind(path) == "bake":
-        from ...data.store.database import load
+        from ...data.store.bake_folder import read_bake
 
-        bake = load(path)
+        bake = read_bake(path)
         return bake.graph if bake.scene is None else (bake.scene, path)
     from ...data.readers import read
 
     return read(path, up=up, unit=unit, doors=doors), None
-
-
-def opaque_and_glass(scene: Scene) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-    """Triangles that stop sight and those that do not, each with the object of every triangle."""
-    triangles, owners = scene.triangles()
-    opaque = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
-    return (triangles[opaque], owners[opaque]), (triangles[~opaque], owners[~opaque])
 
 
 def read_kind(folder: Path) -> str:
@@ -204,7 +194,7 @@ class _Hunt:
 
     def __init__(self, scene: Scene, view: ViewCells, claims: Claims, rays: int, seed: int):
         self.rays, self.seed = rays, seed
-        self.opaque, self.glass = opaque_and_glass(scene)
+        self.opaque, self.glass = scene.triangles(*OPAQUE), scene.triangles(Role.TRANSPARENT)
         if not len(self.opaque[0]):
             raise InputError(f"{scene.source or 'model'}: expected opaque triangles, found none")
         lines = Sightlines(*self.opaque)

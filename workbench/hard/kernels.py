@@ -15,37 +15,46 @@ from ...data.blockers import Blockers
 from ...data.camera import CameraPath, Screen
 from ...data.graph import CellGraph
 from ...data.hierarchy import build_hierarchy
-from ...data.patches import Patches, find_patches
+from ...data.patches import Patches, find_patches, join_outlines
+from ...data.prepared import PreparedModel
+from ...data.ragged import starts_of
 from ...data.readers import read
 from ...data.scene import GRID_LIMIT, Definition, Instance, Mesh, Role, Scene
+from ...data.solids import closed_elements
+from ...data.verdict import Verdict
 from ...kernels.backface import build_cones, launch_backface
+from ...kernels.blockers import BlockerTree, blocker_tree
 from ...kernels.coverage import CubeMaps, launch_coverage
 from ...kernels.deviation import launch_deviation
 from ...kernels.flood import launch_flood
+from ...kernels.launch import Device
 from ...kernels.line_tree import launch_line_trees
 from ...kernels.occludee import launch_occludees
 from ...kernels.raster import device_triangles as raster_triangles
 from ...kernels.raster import launch_raster
 from ...kernels.select import launch_select
-from ...kernels.shadow import Umbras, launch_grow_hole, launch_shrink, launch_umbra
-from ...kernels.shaft import device_shields, launch_shaft
+from ...kernels.shaft import launch_shaft
+from ...kernels.shields import device_shields
+from ...kernels.shrink import launch_shrink
 from ...kernels.sightline import aim_targets, device_triangles, launch_aim, launch_confirm
 from ...kernels.stab_batch import launch_stab
-from ...kernels.target import BlockerTree, blocker_tree, launch_target_search
-from ...kernels.trace import launch_walk
-from ...solvers.visibility.engine import Engine, find_occluders
-from ...solvers.visibility.projection import VlodSettings, join_outlines, vlod_hidden
-from ...verify.arithmetic import cross, dot, minus
+from ...kernels.target import launch_target_search
+from ...kernels.trace import launch_trace
+from ...kernels.umbra import Umbras, launch_umbra
+from ...solvers.projection_point import cluster_problems, solve_points
+from ...solvers.visibility.graph_engine import GraphEngine
+from ...solvers.visibility.projection import VlodSettings, vlod_hidden
+from ...verify.arithmetic import box_corners, cross, dot, minus, rational
 from ...verify.cases.hard_cases import GraphCase, HardCases, ModelCase, RegionCase, Shape, faces, fan
 from ...verify.exact.deviation import deviation_squared
 from ...verify.exact.raster import first_hit
-from ...verify.exact.shadow import box_corners, grown_hole, occluder, rational
 from ...verify.proofs.line_tree import Blocker
 from ...verify.proofs.line_tree import hides as line_tree_hides
-from ..bake.run import Settings, bake, opaque_rectangles
+from ..bake.run import bake
+from ..bake.settings import Settings
 
 if TYPE_CHECKING:
-    from ...data.store.database import Bake
+    from ...data.store.bake_folder import BakeFolder
 
 # Halvings, and lines tried, before a kernel gives up a case.
 CAP = 4000
@@ -80,17 +89,17 @@ def _one_sided(claimed: bool, hidden: bool) -> Outcome:
 
 
 def _two_sided(verdict: int, hidden: bool) -> Outcome:
-    """Of a kernel that answers 0 hidden, 1 visible, 2 unknown."""
-    if verdict == 2:
+    """Of a kernel that answers with a `Verdict`."""
+    if verdict == Verdict.UNKNOWN:
         return Outcome.WITHHELD
-    return Outcome.RIGHT if (verdict == 0) == hidden else Outcome.WRONG
+    return Outcome.RIGHT if (verdict == Verdict.HIDDEN) == hidden else Outcome.WRONG
 
 
 def _worst(outcomes: Iterable[Outcome]) -> Outcome:
     return max(outcomes, default=Outcome.RIGHT)
 
 
-def _stab(cases: HardCases, device: str) -> Outcomes:
+def _stab(cases: HardCases, device: Device) -> Outcomes:
     most = max(len(case.boxes) for case in cases.stab)
     # A local origin is subtracted exactly, as the readers do: 100 km in millimetres is beyond the grid.
     boxes = [c.boxes - c.boxes[0, 0] if np.abs(c.boxes).max() > GRID_LIMIT else c.boxes for c in cases.stab]
@@ -112,22 +121,22 @@ def graph_of(case: GraphCase) -> CellGraph:
     )
 
 
-def _engine(case: GraphCase, device: str) -> Engine:
-    return Engine(None, graph_of(case), None, seed=0, threads=1, device=device)
+def _engine(case: GraphCase, device: Device) -> GraphEngine:
+    return GraphEngine(graph_of(case), device=device)
 
 
-def _flood(cases: HardCases, device: str) -> Outcomes:
+def _flood(cases: HardCases, device: Device) -> Outcomes:
     for case in cases.graph:
         count = len(case.cells)
         found = launch_flood(_engine(case, device).model.device_graph, np.arange(count), cap=CAP, device=device)
-        verdict = np.where(found.undecided | ~found.complete[:, None], 2, 0)
-        verdict[found.pairs[:, 0], found.pairs[:, 1]] = 1
+        verdict = np.where(found.undecided | ~found.complete[:, None], Verdict.UNKNOWN, Verdict.HIDDEN)
+        verdict[found.pairs[:, 0], found.pairs[:, 1]] = Verdict.VISIBLE
         pairs = [(a, b) for a in range(count) for b in range(count) if a != b]
         hidden = {(a, b): (min(a, b), max(a, b)) not in case.seen for a, b in pairs}
         yield case.name, _worst(_two_sided(int(verdict[pair]), hidden[pair]) for pair in pairs)
 
 
-def _target_search(cases: HardCases, device: str) -> Outcomes:
+def _target_search(cases: HardCases, device: Device) -> Outcomes:
     for case in cases.graph:
         model = _engine(case, device).model
         count = len(case.cells)
@@ -140,12 +149,12 @@ def _target_search(cases: HardCases, device: str) -> Outcomes:
         answers = launch_target_search(asked.tree, asked.ends, TO_SURFACE, cap=CAP, device=device)
         # What lies in the plane of one face of the target counts for no other: visible is no proof then.
         if asked.on_face:
-            yield asked.case.name, _one_sided(answers.verdict[0] == 0, hidden)
+            yield asked.case.name, _one_sided(answers.verdict[0] == Verdict.HIDDEN, hidden)
         else:
             yield asked.case.name, _two_sided(int(answers.verdict[0]), hidden)
 
 
-def _line_trees(cases: HardCases, device: str) -> Outcomes:
+def _line_trees(cases: HardCases, device: Device) -> Outcomes:
     """A tree must hold, and there is none where something can be seen."""
     for asked in _axial_regions(cases, device):
         answers = launch_target_search(asked.tree, asked.ends, TO_SURFACE, cap=CAP, device=device)
@@ -172,7 +181,7 @@ class _AxialRegion:
     on_face: bool
 
 
-def _axial_regions(cases: HardCases, device: str) -> Iterator[_AxialRegion]:
+def _axial_regions(cases: HardCases, device: Device) -> Iterator[_AxialRegion]:
     """Cases that a search of lines can be asked: axial, cell and target apart."""
     for case in cases.region:
         walls = [np.array(face, np.int32) for shape in case.occluders for face in faces(shape)]
@@ -202,14 +211,14 @@ def _rectangle(box: np.ndarray) -> list[tuple[int, ...]]:
     return [tuple(corner) for corner in found[0]] if len(found) == 1 else []
 
 
-def _walk(cases: HardCases, device: str) -> Outcomes:
+def _trace(cases: HardCases, device: Device) -> Outcomes:
     for case in cases.graph:
         if not case.walks:
             continue
         ends = np.array([walk.segment for walk in case.walks])
         sources = np.array([walk.source for walk in case.walks])
         graph = _engine(case, device).model.device_graph
-        reached = launch_walk(graph, sources, ends[:, 0], ends[:, 1], device=device)[0]
+        reached = launch_trace(graph, sources, ends[:, 0], ends[:, 1], device=device)[0]
         outcomes = []
         for walk, cell in zip(case.walks, reached.tolist(), strict=True):
             outcomes.append(
@@ -218,7 +227,7 @@ def _walk(cases: HardCases, device: str) -> Outcomes:
         yield case.name, _worst(outcomes)
 
 
-def _confirm(cases: HardCases, device: str) -> Outcomes:
+def _confirm(cases: HardCases, device: Device) -> Outcomes:
     for case in cases.sightline:
         triangles = np.array(case.triangles, np.int32)
         ends = np.array(case.segment)[:, None]
@@ -229,7 +238,7 @@ def _confirm(cases: HardCases, device: str) -> Outcomes:
         yield case.name, _clearance(bool(clear), case.expected)
 
 
-def _aim(cases: HardCases, device: str) -> Outcomes:
+def _aim(cases: HardCases, device: Device) -> Outcomes:
     """Boxes without extent leave one line to aim along."""
     for case in cases.sightline:
         ends = np.array(case.segment)
@@ -289,13 +298,13 @@ def _scene(shapes: list[Shape]) -> Scene:
     return Scene([Definition("shape", (mesh,))], objects, grid_m=1.0)
 
 
-def _shaft(cases: HardCases, device: str) -> Outcomes:
+def _shaft(cases: HardCases, device: Device) -> Outcomes:
     for asked in _questions(cases):
-        scene = _scene(asked.shapes)
-        shields = device_shields(*find_occluders(scene, opaque_rectangles(scene)), device)
+        model = PreparedModel(_scene(asked.shapes))
+        shields = device_shields(model.regions, model.patches, device)
         boxes = np.array([asked.cell, asked.box], np.int32)
         answers = launch_shaft(shields, boxes, np.array([[0, 1]]), smallest=(1, 1), cap=CAP, device=device)
-        yield asked.name, _one_sided(bool(answers.verdict[0] == 0), asked.hidden)
+        yield asked.name, _one_sided(bool(answers.verdict[0] == Verdict.HIDDEN), asked.hidden)
 
 
 def _outlines(shapes: list[Shape]) -> Patches:
@@ -319,7 +328,7 @@ class _Shadows:
     umbras: Umbras
 
     @staticmethod
-    def of_cases(cases: HardCases, device: str) -> "_Shadows":
+    def of_cases(cases: HardCases, device: Device) -> "_Shadows":
         """The umbras of all questions, by one launch."""
         questions = _questions(cases)
         tables = [_outlines(asked.shapes) for asked in questions]
@@ -329,7 +338,7 @@ class _Shadows:
         return _Shadows(questions, cells, outlines, of, launch_umbra(cells, outlines, pairs, device=device))
 
 
-def _umbra(cases: HardCases, device: str) -> Outcomes:
+def _umbra(cases: HardCases, device: Device) -> Outcomes:
     shadows = _Shadows.of_cases(cases, device)
     for number, asked in enumerate(shadows.questions):
         corners = np.array(box_corners(asked.box), float)
@@ -337,7 +346,7 @@ def _umbra(cases: HardCases, device: str) -> Outcomes:
         yield asked.name, _one_sided(claimed, asked.hidden)
 
 
-def _shrink(cases: HardCases, device: str) -> Outcomes:
+def _shrink(cases: HardCases, device: Device) -> Outcomes:
     """Seen from several projection points, with and without a limit of depth, no visible box may be behind."""
     shadows = _Shadows.of_cases(cases, device)
     rows = np.arange(len(shadows.of))
@@ -373,70 +382,45 @@ def _behind(eye: np.ndarray, outline: np.ndarray, normal: np.ndarray, far: float
     return all(dot(m, minus(x, viewpoint)) >= 0 for m in planes for x in points)
 
 
-def _grow_hole(cases: HardCases, device: str) -> Outcomes:
-    """The outline of an umbra as a hole: what the twin sees through it must be in the grown hole."""
-    for case in cases.shadow:
-        exact = occluder(case.cell, case.outline)
-        eye = [Fraction(a + b, 2) for a, b in zip(*case.cell, strict=True)]
-        point = np.array([[float(c) for c in eye]])
-        holes = _outlines([case.outline])
-        status, grown = launch_grow_hole(np.array([case.cell]), holes, [[0, 0]], point, device=device)
-        usable = not exact.straddles and all(exact.depth(p) < 0 for p in exact.cell)
-        if not usable:
-            yield case.name, Outcome.RIGHT if status[0] else Outcome.WRONG
-            continue
-        if status[0]:
-            yield case.name, Outcome.WITHHELD
-            continue
-        wanted, corners = grown_hole(exact, eye), rational(grown.corners.tolist())
-        sides = zip(corners, corners[1:] + corners[:1], strict=True)
-        planes = [cross(minus(a, eye), minus(b, eye)) for a, b in sides]
-        held = all(dot(m, minus(x, eye)) >= 0 for m in planes for x in wanted)
-        yield case.name, Outcome.RIGHT if held else Outcome.WRONG
-
-
-def _maps(cases: HardCases, device: str) -> Iterator[CubeMaps]:
+def _maps(cases: HardCases, device: Device) -> Iterator[CubeMaps]:
     for case in cases.coverage:
         polygons = [face for shape in case.polygons for face in faces(shape)]
-        starts = np.concatenate([[0], np.cumsum([len(p) for p in polygons])])
+        starts = starts_of([len(p) for p in polygons])
         corners = np.array([corner for polygon in polygons for corner in polygon], float)
         owners = np.zeros(len(polygons), int)
         yield launch_coverage(np.array([case.viewpoint]), corners, starts, owners, resolution=case.size, device=device)
 
 
-def _coverage(cases: HardCases, device: str) -> Outcomes:
+def _coverage(cases: HardCases, device: Device) -> Outcomes:
     for case, maps in zip(cases.coverage, _maps(cases, device), strict=True):
         found = {tuple(pixel) for pixel in np.argwhere(np.isfinite(maps.depth(0))).tolist()}
         outcome = Outcome.RIGHT if found == case.pixels else Outcome.WITHHELD
         yield case.name, Outcome.WRONG if found - case.pixels else outcome
 
 
-def _occludees(cases: HardCases, device: str) -> Outcomes:
+def _occludees(cases: HardCases, device: Device) -> Outcomes:
     for case, maps in zip(cases.coverage, _maps(cases, device), strict=True):
-        hidden = launch_occludees(maps, np.array([case.box]), np.array([[0, 0]]))[0]
-        yield case.name, _one_sided(bool(hidden), case.expected == "hidden")
+        verdict = launch_occludees(maps, np.array([case.box]), np.array([[0, 0]]))[0]
+        yield case.name, _one_sided(bool(verdict == Verdict.HIDDEN), case.expected == "hidden")
     shadows = _Shadows.of_cases(cases, device)
     yield from _projected(shadows, shadows.cells.mean(axis=1), device)
 
 
-def _projected(shadows: _Shadows, points: np.ndarray, device: str) -> Outcomes:
+def _projected(shadows: _Shadows, points: np.ndarray, device: Device) -> Outcomes:
     """Questions by shrunk occluders in cube maps, one projection point each."""
     polygons = launch_shrink(shadows.umbras, np.arange(len(shadows.of)), points[shadows.of], device=device)
     sizes = np.diff(polygons.starts)
-    starts = np.concatenate([[0], np.cumsum(sizes[sizes > 0])])
+    starts = starts_of(sizes[sizes > 0])
     owners = shadows.of[sizes > 0]
     maps = launch_coverage(points, polygons.corners, starts, owners, resolution=RESOLUTION, device=device)
     boxes = np.array([asked.box for asked in shadows.questions], np.int32)
-    hidden = launch_occludees(maps, boxes, np.repeat(np.arange(len(boxes))[:, None], 2, axis=1))
-    for asked, claim in zip(shadows.questions, hidden, strict=True):
+    verdicts = launch_occludees(maps, boxes, np.repeat(np.arange(len(boxes))[:, None], 2, axis=1))
+    for asked, claim in zip(shadows.questions, verdicts == Verdict.HIDDEN, strict=True):
         yield asked.name, _one_sided(bool(claim), asked.hidden)
 
 
-def _solve_points(cases: HardCases, device: str) -> Outcomes:
+def _solve_points(cases: HardCases, device: Device) -> Outcomes:
     """All occluders of a question as one cluster."""
-    # Imported late: JAX takes seconds.
-    from ...solvers.projection_point import cluster_problems, solve_points
-
     shadows = _Shadows.of_cases(cases, device)
     for objective in ("socp", "lp"):
         cluster = np.zeros(len(shadows.of), int)
@@ -446,7 +430,7 @@ def _solve_points(cases: HardCases, device: str) -> Outcomes:
             yield f"{name}, {objective}", outcome
 
 
-def _vlod(cases: HardCases, device: str) -> Outcomes:
+def _vlod(cases: HardCases, device: Device) -> Outcomes:
     settings = VlodSettings(clusters=6, objective="centre", resolution=RESOLUTION)
     for asked in _questions(cases):
         cells, boxes = np.array([asked.cell], np.int32), np.array([asked.box], np.int32)
@@ -454,10 +438,11 @@ def _vlod(cases: HardCases, device: str) -> Outcomes:
         yield asked.name, _one_sided(bool(hidden[0, 0]), asked.hidden)
 
 
-def _backface(cases: HardCases, device: str) -> Outcomes:
+def _backface(cases: HardCases, device: Device) -> Outcomes:
     for case in cases.backface:
-        boxes, rows = np.array([case.cell], np.int32), np.zeros((1, 2), int)
-        removed = int(launch_backface(build_cones(_scene(case.surface)), boxes, rows, device=device)[0][0])
+        boxes, rows, scene = np.array([case.cell], np.int32), np.zeros((1, 2), int), _scene(case.surface)
+        cones = build_cones(closed_elements(scene), scene.triangle_counts)
+        removed = int(launch_backface(cones, boxes, rows, device=device)[0][0])
         outcome = Outcome.RIGHT if removed == case.expected else Outcome.WITHHELD
         yield case.name, Outcome.WRONG if removed > case.expected else outcome
 
@@ -478,19 +463,23 @@ def write_model(case: ModelCase, folder: Path) -> tuple[Path, Path]:
     return model, cells
 
 
-def _bake(method: str) -> Callable[[HardCases, str], Outcomes]:
-    def run(cases: HardCases, device: str) -> Outcomes:
+def _bake(method: str) -> Callable[[HardCases, Device], Outcomes]:
+    def run(cases: HardCases, device: Device) -> Outcomes:
         for case in cases.model:
             with tempfile.TemporaryDirectory() as name:
                 model, cells = write_model(case, Path(name))
                 settings = Settings(method=method, cells=str(cells))
-                made = bake(read(model), Path(name) / "out.bake", settings=settings, threads=1, device=device)
+                made = bake(read(model), Path(name) / "out.bake", settings=settings, threads=1, device=device.name)
                 yield case.name, _baked(case, made)
 
     return run
 
 
-def _baked(case: ModelCase, made: "Bake") -> Outcome:
+def _verdict(kept: bool, witnessed: bool) -> Verdict:
+    return Verdict.VISIBLE if witnessed else Verdict.UNKNOWN if kept else Verdict.HIDDEN
+
+
+def _baked(case: ModelCase, made: "BakeFolder") -> Outcome:
     outcomes = []
     for cell, row in enumerate(made.potential_objects):
         witnessed = set(made.seen(cell).tolist())
@@ -498,11 +487,11 @@ def _baked(case: ModelCase, made: "Bake") -> Outcome:
             if (cell, target) in case.seen:
                 outcomes.append(_one_sided(not kept, hidden=False))
             else:
-                outcomes.append(_two_sided(1 if target in witnessed else 2 * kept, hidden=True))
+                outcomes.append(_two_sided(_verdict(kept, target in witnessed), hidden=True))
     return _worst(outcomes)
 
 
-def _select(cases: HardCases, device: str) -> Outcomes:
+def _select(cases: HardCases, device: Device) -> Outcomes:
     """All whole numbers: values are exact. Less than the optimum is withheld, less than half of the gain wrong."""
     for case in cases.knapsack:
         levels = np.array([level for levels in case.objects for level in levels])
@@ -521,7 +510,7 @@ def _select(cases: HardCases, device: str) -> Outcomes:
             yield case.name, Outcome.WRONG
 
 
-def _deviation(cases: HardCases, device: str) -> Outcomes:
+def _deviation(cases: HardCases, device: Device) -> Outcomes:
     """From the occluders' surface to the target's and back: the bounds must not miss what rationals say."""
     for case in (c for c in cases.region if len(c.occluders) == 1):
         sides = [_triangles(shapes) for shapes in (case.occluders, [case.target])]
@@ -538,7 +527,7 @@ def _deviation(cases: HardCases, device: str) -> Outcomes:
         yield case.name, _worst(outcomes)
 
 
-def _raster(cases: HardCases, device: str) -> Outcomes:
+def _raster(cases: HardCases, device: Device) -> Outcomes:
     """A small picture from the cell's middle towards the target's: what rationals tell surely must be shown."""
     screen = Screen(2, 2, 60.0)
     for case in cases.region:
@@ -564,18 +553,17 @@ def _raster(cases: HardCases, device: str) -> Outcomes:
         yield case.name, _worst(outcomes)
 
 
-KERNELS: dict[str, Callable[[HardCases, str], Outcomes]] = {
+KERNELS: dict[str, Callable[[HardCases, Device], Outcomes]] = {
     "launch_stab": _stab,
     "launch_flood": _flood,
     "launch_target_search": _target_search,
     "launch_line_trees": _line_trees,
-    "launch_walk": _walk,
+    "launch_trace": _trace,
     "launch_confirm": _confirm,
     "launch_aim": _aim,
     "launch_shaft": _shaft,
     "launch_umbra": _umbra,
     "launch_shrink": _shrink,
-    "launch_grow_hole": _grow_hole,
     "launch_coverage": _coverage,
     "launch_occludees": _occludees,
     "launch_backface": _backface,

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import warp as wp
 
-from ...kernels.launch import check_device
+from ...kernels.launch import Device
 from ...verify.cases.hard_cases import FOLDER, HardCases, load_hard_cases
 from .kernels import KERNELS, Outcome
 
@@ -54,10 +54,9 @@ def run_hard_cases(
         InputError: a case file is malformed, or a device unknown.
     """
     cases = load_hard_cases(folder)
-    devices = ["cpu", *(d.alias for d in wp.get_cuda_devices()[:1])] if devices is None else list(devices)
-    for device in devices:
-        check_device(device)
-    return [_row(kernel, device, cases) for kernel in kernels or KERNELS for device in devices]
+    names = ["cpu", *(d.alias for d in wp.get_cuda_devices()[:1])] if devices is None else list(devices)
+    where = [Device.wanted(name, 1) for name in names]
+    return [_row(kernel, device, cases) for kernel in kernels or KERNELS for device in where]
 
 
 def hard_cases_table(rows: list[Row]) -> str:
@@ -68,9 +67,9 @@ def hard_cases_table(rows: list[Row]) -> str:
     return "\n".join(lines)
 
 
-def _row(kernel: str, device: str, cases: HardCases) -> Row:
+def _row(kernel: str, device: Device, cases: HardCases) -> Row:
     found: dict[Outcome, list[str]] = {outcome: [] for outcome in Outcome}
     for name, outcome in KERNELS[kernel](cases, device):
         found[outcome].append(name)
     withheld, wrong = tuple(found[Outcome.WITHHELD]), tuple(found[Outcome.WRONG])
-    return Row(kernel, device, len(found[Outcome.RIGHT]), withheld, wrong)
+    return Row(kernel, device.name, len(found[Outcome.RIGHT]), withheld, wrong)

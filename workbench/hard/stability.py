@@ -18,8 +18,7 @@ from tqdm import tqdm
 from ...data.errors import InputError
 from ...data.scene import GRID_LIMIT, GRID_M
 from ...data.verdict import Verdict
-from ...kernels.launch import check_device
-from ...kernels.stab import HIDDEN, STABBED
+from ...kernels.launch import Device
 from ...kernels.stab_batch import launch_stab
 from ...verify.cases.case_file import StabCase
 from ...verify.cases.hard_cases import HardCases, RegionCase, Shape, SightlineCase
@@ -79,13 +78,13 @@ def measure_stability(
     Raises:
         InputError: an unknown device.
     """
-    check_device(device)
+    where = Device.wanted(device, 1)
     rows: list[Row] = []
     sweeps = list(_sweeps(cases or CASES, seed))
     for knob, value, hard in tqdm(sweeps, desc="stability", unit="value", disable=not progress):
         kernels = [*(["launch_stab"] if hard.stab else []), *(REGION_KERNELS if hard.region else [])]
         kernels += ["launch_confirm"] if hard.sightline else []
-        rows += [_row(knob, value, kernel, hard, device) for kernel in kernels]
+        rows += [_row(knob, value, kernel, hard, where) for kernel in kernels]
         if hard.sightline:
             rows.append(_by_float32(knob, value, hard.sightline))
     return rows
@@ -183,7 +182,7 @@ def edge_case(random: np.random.Generator, distance: float, offset: int, visible
     )
 
 
-def _row(knob: str, value: float, kernel: str, hard: HardCases, device: str) -> Row:
+def _row(knob: str, value: float, kernel: str, hard: HardCases, device: Device) -> Row:
     try:
         outcomes = [outcome for _, outcome in (_by_stab if kernel == "launch_stab" else KERNELS[kernel])(hard, device)]
     except InputError:
@@ -192,15 +191,13 @@ def _row(knob: str, value: float, kernel: str, hard: HardCases, device: str) -> 
     return Row(knob, float(value), kernel, len(outcomes), withheld, wrong, not outcomes)
 
 
-def _by_stab(hard: HardCases, device: str) -> Iterator[tuple[str, Outcome]]:
+def _by_stab(hard: HardCases, device: Device) -> Iterator[tuple[str, Outcome]]:
     """As the hard cases do it, but without moving far cases to an origin of their own."""
     boxes, signs = np.stack([case.boxes for case in hard.stab]), np.array([case.signs for case in hard.stab])
     for case, verdict in zip(hard.stab, launch_stab(boxes, signs, device=device).verdict.tolist(), strict=True):
-        right = (verdict == STABBED) == (case.expected == "open")
-        yield (
-            case.name,
-            Outcome.WITHHELD if verdict not in (HIDDEN, STABBED) else Outcome.RIGHT if right else Outcome.WRONG,
-        )
+        right = (verdict == Verdict.VISIBLE) == (case.expected == "open")
+        withheld = verdict == Verdict.UNKNOWN
+        yield case.name, Outcome.WITHHELD if withheld else Outcome.RIGHT if right else Outcome.WRONG
 
 
 def _by_float32(knob: str, value: float, cases: list[SightlineCase]) -> Row:

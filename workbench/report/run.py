@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...data.errors import InputError
-from ...data.scene import Role
+from ...data.prepared import PreparedModel
+from ...data.scene import OPAQUE
 from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses, visible_rows
 from .plans import Painter, Section, Storey, find_storeys, plan_of
@@ -18,7 +19,7 @@ from .web_page import page, read_curves_json
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ...data.store.database import Bake
+    from ...data.store.bake_folder import BakeFolder
 
 # Sightlines drawn, to the largest cells and objects that are seen.
 SIGHTLINES_MOST = {"cell": 40, "object": 20}
@@ -32,7 +33,7 @@ COUNTED = ("cells", "inhabitable cells", "portals", "objects", "opaque triangles
 
 
 def report(
-    bake: "Bake",
+    bake: "BakeFolder",
     *,
     cells: "Sequence[int] | None" = None,
     out: str | Path | None = None,
@@ -73,7 +74,7 @@ def report(
     return folder / "report.md"
 
 
-def choose_cells(bake: "Bake") -> dict[int, str]:
+def choose_cells(bake: "BakeFolder") -> dict[int, str]:
     """Three telling inhabitable cells and why; fewer where they coincide."""
     sources = np.flatnonzero(bake.graph.inhabitable)
     if not len(sources):
@@ -94,18 +95,18 @@ def choose_cells(bake: "Bake") -> dict[int, str]:
     return chosen
 
 
-def _seen_counts(bake: "Bake") -> np.ndarray:
+def _seen_counts(bake: "BakeFolder") -> np.ndarray:
     """Number of witnessed cells, or objects of a bake that claims nothing of cells, of every cell, shape (cells,)."""
     table = bake.cell_to_cell if bake.claims_cells else bake.cell_to_object
     return np.bincount(visible_rows(table)["cell_id"].to_numpy(), minlength=bake.graph.cell_count)
 
 
-def _potential(bake: "Bake") -> np.ndarray:
+def _potential(bake: "BakeFolder") -> np.ndarray:
     """What `_seen_counts` counts, potentially visible, shape (cells, targets), bool."""
     return bake.potential_cells if bake.claims_cells else bake.potential_objects
 
 
-def _write(bake: "Bake", chosen: dict[int, str], folder: Path) -> None:
+def _write(bake: "BakeFolder", chosen: dict[int, str], folder: Path) -> None:
     painter = Painter(bake.graph, bake.scene, bake.grid_m, whole=not bake.claims_cells)
     name = model_name(bake)
     lines = [f"# {name}", "", *_numbers(bake), ""]
@@ -131,15 +132,9 @@ def _write(bake: "Bake", chosen: dict[int, str], folder: Path) -> None:
 class _Shadows:
     """Occluders of a model, and how vLOD's method shrinks them for a view cell."""
 
-    def __init__(self, bake: "Bake") -> None:
-        from ...data.occludees import find_occludees
-        from ...solvers.visibility.engine import find_occluders, with_details
-        from ...solvers.visibility.projection import join_outlines, rectangle_outlines
-        from ..bake.run import opaque_rectangles
-
-        regions, patches = find_occluders(bake.scene, with_details(bake.scene, opaque_rectangles(bake.scene)))
-        self._outlines = join_outlines(rectangle_outlines(regions.boxes), patches)
-        self._pieces = find_occludees(bake.scene).pieces
+    def __init__(self, bake: "BakeFolder") -> None:
+        model = PreparedModel(bake.scene)
+        self._outlines, self._pieces = model.outlines, model.occludees.pieces
         self._cells = bake.graph.cells
 
     def of(self, cell: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -151,7 +146,7 @@ class _Shadows:
         return found.points[np.unique(found.cluster)], found.corners, found.starts
 
 
-def _draw_objects(bake: "Bake", painter: Painter, shadows: _Shadows, cell: int, path: Path) -> tuple[str, str]:
+def _draw_objects(bake: "BakeFolder", painter: Painter, shadows: _Shadows, cell: int, path: Path) -> tuple[str, str]:
     """Draw the objects that a view cell sees; returns the picture's title and caption."""
     seen, lines = _sights(bake, cell, "object")
     kinds = np.where(bake.potential_objects[cell], "unknown", "hidden")
@@ -170,7 +165,7 @@ def _draw_objects(bake: "Bake", painter: Painter, shadows: _Shadows, cell: int, 
     return title, caption
 
 
-def model_name(bake: "Bake") -> str:
+def model_name(bake: "BakeFolder") -> str:
     """The model's file name, or what a synthetic model is in a few words."""
     source = str(bake.manifest.get("source", ""))
     call = CALL.fullmatch(source)
@@ -181,7 +176,7 @@ def model_name(bake: "Bake") -> str:
     return f"Synthetic {call[1]}{size}"
 
 
-def _draw_set(bake: "Bake", painter: Painter, storeys: list[Storey], cell: int, path: Path) -> tuple[str, str]:
+def _draw_set(bake: "BakeFolder", painter: Painter, storeys: list[Storey], cell: int, path: Path) -> tuple[str, str]:
     """Draw one cell's set; returns the picture's title and caption."""
     seen_cells, cell_lines = _sights(bake, cell, "cell")
     _, object_lines = _sights(bake, cell, "object")
@@ -207,7 +202,7 @@ def _draw_set(bake: "Bake", painter: Painter, storeys: list[Storey], cell: int, 
     return title, caption
 
 
-def _sights(bake: "Bake", cell: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
+def _sights(bake: "BakeFolder", cell: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
     """Targets that have a witness, and the witnesses of the largest, shape (n, 2, 3), in grid steps."""
     table, column = (bake.cell_to_cell, "reached_cell_id") if kind == "cell" else (bake.cell_to_object, "object_id")
     rows = visible_rows(table)
@@ -218,14 +213,14 @@ def _sights(bake: "Bake", cell: int, kind: str) -> tuple[np.ndarray, np.ndarray]
     return sights.targets, lines[good[np.argsort(-size, kind="stable")[: SIGHTLINES_MOST[kind]]]]
 
 
-def _sizes(bake: "Bake", kind: str) -> np.ndarray:
+def _sizes(bake: "BakeFolder", kind: str) -> np.ndarray:
     """Length of the diagonals of all cells' or objects' boxes [grid steps], float64; below 0 for empty objects."""
     boxes = bake.graph.cells if kind == "cell" else bake.scene.object_bounds() if bake.scene else np.zeros((0, 2, 3))
     extent = (boxes[:, 1].astype(np.float64) - boxes[:, 0]).min(axis=1, initial=np.inf)
     return np.where(extent < 0, -1.0, np.linalg.norm(boxes[:, 1].astype(np.float64) - boxes[:, 0], axis=1))
 
 
-def _unknown_targets(bake: "Bake", cell: int) -> list[str]:
+def _unknown_targets(bake: "BakeFolder", cell: int) -> list[str]:
     """Table of the largest targets that have neither witness nor proof."""
     rows = []
     kinds = [("cell", bake.potential_cells[cell])] if bake.claims_cells else []
@@ -250,7 +245,7 @@ def _unknown_targets(bake: "Bake", cell: int) -> list[str]:
     return [*head, *rows, ""]
 
 
-def _describe(bake: "Bake", kind: str, target: int) -> str:
+def _describe(bake: "BakeFolder", kind: str, target: int) -> str:
     """Id, kind and name of a target, as three columns."""
     if kind == "cell":
         place = "inhabitable cell" if bake.graph.inhabitable[target] else "wall, sliver or exterior cell"
@@ -260,12 +255,11 @@ def _describe(bake: "Bake", kind: str, target: int) -> str:
     return f"object {target} | {placed.kind} ({placed.role.value}) | {name}"
 
 
-def _numbers(bake: "Bake") -> list[str]:
+def _numbers(bake: "BakeFolder") -> list[str]:
     """Tables of counts, overestimates and seconds."""
     triangles = 0
     if bake.scene is not None:
-        opaque = bake.scene.object_mask(Role.OCCLUDER, Role.DETAIL)
-        triangles = int(opaque[bake.scene.triangles()[1]].sum())
+        triangles = len(bake.scene.triangles(*OPAQUE)[0])
     objects = len(bake.scene.objects) if bake.scene is not None else 0
     graph = bake.graph
     values = (graph.cell_count, int(graph.inhabitable.sum()), graph.portal_count, objects, triangles)
@@ -287,7 +281,7 @@ def _numbers(bake: "Bake") -> list[str]:
     return lines
 
 
-def _set_table(bake: "Bake", chosen: dict[int, str]) -> list[str]:
+def _set_table(bake: "BakeFolder", chosen: dict[int, str]) -> list[str]:
     """One row for each chosen cell."""
     seen = _seen_counts(bake)
     lines = [

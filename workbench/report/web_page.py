@@ -26,7 +26,7 @@ from ...verify.rays.witness import read_witnesses
 from .plans import Storey, find_storeys, plan_of, section_lines
 
 if TYPE_CHECKING:
-    from ...data.store.database import Bake
+    from ...data.store.bake_folder import BakeFolder
 
 # Cut surfaces are drawn to about 8 mm, coarser only where a model has more segments than the page should hold.
 DRAWN_STEPS = 8
@@ -60,7 +60,7 @@ class Rows(NamedTuple):
     portals: np.ndarray
 
 
-def page(bake: "Bake", title: str, curves: dict | None = None) -> str:
+def page(bake: "BakeFolder", title: str, curves: dict | None = None) -> str:
     """The page, complete in itself.
 
     Args:
@@ -77,7 +77,7 @@ def page(bake: "Bake", title: str, curves: dict | None = None) -> str:
     return re.sub(r"\{\{([\w.]+)\}\}", lambda place: parts[place[1]], text)
 
 
-def page_data(bake: "Bake", title: str, curves: dict | None = None) -> dict:
+def page_data(bake: "BakeFolder", title: str, curves: dict | None = None) -> dict:
     """What the page shows, as JSON; arrays as `pack` makes them, coordinates in grid steps."""
     graph = bake.graph
     storeys = find_storeys(graph, bake.grid_m)
@@ -154,7 +154,7 @@ def _zipped(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, mtime=0)).decode()
 
 
-def _facts(bake: "Bake") -> dict:
+def _facts(bake: "BakeFolder") -> dict:
     """Numbers and words of the manifest."""
     found, skipped = bake.manifest, bake.manifest.get("skipped", [])
     return {
@@ -182,7 +182,7 @@ def _word(value: object) -> str:
     return ("no", "yes")[value] if isinstance(value, bool) else str(value)
 
 
-def _objects(bake: "Bake") -> dict:
+def _objects(bake: "BakeFolder") -> dict:
     """Boxes, names, kinds and roles; an object without triangles has low > high."""
     objects = bake.scene.objects if bake.scene is not None else []
     kinds, kind = np.unique([o.kind for o in objects], return_inverse=True) if objects else ([], np.zeros(0, int))
@@ -196,7 +196,7 @@ def _objects(bake: "Bake") -> dict:
     }
 
 
-def _storeys(bake: "Bake", storeys: list[Storey]) -> list[dict]:
+def _storeys(bake: "BakeFolder", storeys: list[Storey]) -> list[dict]:
     """Floor and section of every storey [grid steps], and where the section cuts the model."""
     if bake.scene is None:
         triangles, owners = np.zeros((0, 3, 3), np.int32), np.zeros(0, np.int32)
@@ -259,7 +259,7 @@ def _join_intervals(rows: np.ndarray, along: int, across: int) -> np.ndarray:
     return joined
 
 
-def table_rows(bake: "Bake", kind: str) -> Rows:
+def table_rows(bake: "BakeFolder", kind: str) -> Rows:
     """What view cells see, of cells ("cell") or objects ("object"), with the sightlines that the page holds."""
     table, column = (bake.cell_to_cell, "reached_cell_id") if kind == "cell" else (bake.cell_to_object, "object_id")
     sources, targets = (table[name].to_numpy().astype(np.int64) for name in ("cell_id", column))
@@ -280,7 +280,7 @@ def table_rows(bake: "Bake", kind: str) -> Rows:
 
 
 def _largest(
-    bake: "Bake", kind: str, rows: np.ndarray, sources: np.ndarray, targets: np.ndarray, crossed: np.ndarray
+    bake: "BakeFolder", kind: str, rows: np.ndarray, sources: np.ndarray, targets: np.ndarray, crossed: np.ndarray
 ) -> np.ndarray:
     """As many rows as the page may hold, ascending: of each source those to view cells and large targets first."""
     if len(rows) <= SIGHTLINES_MOST and crossed[rows].sum() <= CROSSINGS_MOST:

@@ -14,7 +14,7 @@ from tqdm import tqdm
 from ... import __version__
 from ...data.camera import CameraPath, Screen
 from ...data.errors import InputError
-from ...data.store.database import Bake
+from ...data.store.bake_folder import BakeFolder
 from ...kernels.select import launch_select
 from ...solvers.levels.benefit import (
     BenefitSettings,
@@ -195,7 +195,7 @@ class _Problem:
 
 
 def tune_lod(
-    bake: Bake,
+    bake: BakeFolder,
     *,
     frames: int = FRAMES,
     budgets_ms: Sequence[float] | None = None,
@@ -248,7 +248,9 @@ def tune_lod(
         return _try_all(problem, cost, renderer, measured, budgets_ms, benefit, coherence, notes, bar.update)
 
 
-def _problem(bake: Bake, path: CameraPath, screen: Screen, benefit: BenefitSettings) -> tuple[_Problem, list[str]]:
+def _problem(
+    bake: BakeFolder, path: CameraPath, screen: Screen, benefit: BenefitSettings
+) -> tuple[_Problem, list[str]]:
     """Tuples along the path, and what should be said of them."""
     kinds = {placed.kind for placed in bake.scene.objects}
     for kind in (*benefit.always, *benefit.importance):
@@ -411,7 +413,7 @@ def recommend(outcomes: Sequence[Outcome]) -> tuple[str, bool, str]:
 
 def write_tuning(
     tuning: Tuning,
-    bake: Bake,
+    bake: BakeFolder,
     out: str | Path,
     *,
     screen: Screen,
@@ -446,7 +448,7 @@ def write_tuning(
 
 
 def _content(
-    tuning: Tuning, bake: Bake, screen: Screen, benefit: BenefitSettings, coherence: Coherence, asked: dict
+    tuning: Tuning, bake: BakeFolder, screen: Screen, benefit: BenefitSettings, coherence: Coherence, asked: dict
 ) -> dict:
     """Contents of tune-lod.json."""
     chosen = asdict(coherence if tuning.best_coherent else Coherence())

@@ -15,7 +15,7 @@ from ..files import write_files
 from .plots import COLOURS, MARKERS, STYLE
 
 if TYPE_CHECKING:
-    from ...data.store.database import Bake
+    from ...data.store.bake_folder import BakeFolder
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Candidate:
     settings: dict[str, object] | None = None
 
 
-def default_out(bake: "Bake") -> Path:
+def default_out(bake: "BakeFolder") -> Path:
     """Where a tuning goes that was not told where: named after the bake, beside it."""
     folder = Path(bake.folder).resolve()
     return folder.with_name(f"{folder.name}.tune")

@@ -10,14 +10,12 @@ import numpy as np
 from tqdm import tqdm
 
 from ...data.errors import InputError
-from ...data.occludees import find_occludees
+from ...data.prepared import PreparedModel
 from ...verify.rays.witness import witnessed_objects
-from ..bake.run import opaque_rectangles
 from .page import Candidate, default_out, pareto_front, write_tune
 
 if TYPE_CHECKING:
-    from ...data.patches import Patches
-    from ...data.store.database import Bake
+    from ...data.store.bake_folder import BakeFolder
     from ...solvers.projection_point import Problem
     from ...solvers.result import Result
     from ...solvers.visibility.projection import VlodSettings
@@ -73,7 +71,7 @@ class PointTuning:
 
 
 def tune_projection_point(
-    bake: "Bake", *, cells: int = 8, seed: int = 0, out: str | Path | None = None, progress: bool = False
+    bake: "BakeFolder", *, cells: int = 8, seed: int = 0, out: str | Path | None = None, progress: bool = False
 ) -> PointTuning:
     """Try every way to choose projection points on some view cells of a bake.
 
@@ -89,8 +87,7 @@ def tune_projection_point(
     Raises:
         InputError: a bake without a model, without inhabitable cells or without occluders; the folder.
     """
-    from ...solvers.visibility.engine import find_occluders, with_details
-    from ...solvers.visibility.projection import VlodSettings, join_outlines, rectangle_outlines
+    from ...solvers.visibility.projection import VlodSettings
 
     scene = bake.scene
     if scene is None:
@@ -99,11 +96,10 @@ def tune_projection_point(
     if not len(sources) or cells < 1:
         raise InputError(f"{bake.folder}: expected view cells to tune on, found none")
     chosen = np.sort(np.random.default_rng(seed).permutation(sources)[:cells])
-    regions, patches = find_occluders(scene, with_details(scene, opaque_rectangles(scene)))
-    outlines = join_outlines(rectangle_outlines(regions.boxes), patches)
-    if not len(outlines.area):
+    model = PreparedModel(scene)
+    if not len(model.outlines.area):
         raise InputError(f"{bake.folder}: expected occluders to choose points for, found no opaque surface of 1 m2")
-    bench = _Bench(bake, chosen, outlines, seed)
+    bench = _Bench(bake, chosen, model, seed)
     plan: list[tuple[VlodSettings, str]] = [
         (VlodSettings(clusters, objective, seed=seed), "")
         for clusters in CLUSTERS
@@ -127,7 +123,7 @@ def tune_projection_point(
     recommended = recommend([c for c in candidates if c.settings])
     wrong = sum(int(c.numbers["wrong hidden"]) for c in candidates)
     folder = Path(out) if out else default_out(bake)
-    pixels = f"{len(chosen)} view cells, {len(scene.objects):,} objects, {len(outlines.area):,} occluders"
+    pixels = f"{len(chosen)} view cells, {len(scene.objects):,} objects, {len(model.outlines.area):,} occluders"
     rule = (
         f"Recommended: {recommended.name}, the fastest of those that `bake` can use whose overestimate is within "
         f"{SLACK:.0%} of the least."
@@ -157,14 +153,12 @@ def _note(wrong: int) -> str:
 class _Bench:
     """View cells of a bake, what is seen from them, and how a setting does on them."""
 
-    def __init__(self, bake: "Bake", cells: np.ndarray, outlines: "Patches", seed: int) -> None:
-        occludees, scene = find_occludees(bake.scene), bake.scene
-        self._boxes, self._outlines, self._seed = bake.graph.cells[cells], outlines, seed
-        self._parts, self._grid_m = occludees.pieces, scene.grid_m
-        self._owners = np.repeat(np.arange(len(scene.objects)), np.diff(occludees.starts))
-        self._triangles = np.bincount(scene.triangles()[1], minlength=len(scene.objects))
-        sizes = np.bincount(self._owners, minlength=len(scene.objects))
-        self._weights = (self._triangles / np.maximum(sizes, 1))[self._owners]
+    def __init__(self, bake: "BakeFolder", cells: np.ndarray, model: PreparedModel, seed: int) -> None:
+        occludees = model.occludees
+        self._boxes, self._outlines, self._seed = bake.graph.cells[cells], model.outlines, seed
+        self._parts, self._owners, self._grid_m = occludees.pieces, occludees.owners, model.scene.grid_m
+        self._triangles = model.scene.triangle_counts
+        self._weights = (self._triangles / np.maximum(np.diff(occludees.starts), 1))[self._owners]
         self._seen = witnessed_objects(bake)[cells]
         self._problems: list[Problem] = []
 

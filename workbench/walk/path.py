@@ -9,9 +9,9 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from ...data.camera import CameraPath
 from ...data.errors import InputError
-from ...data.store.database import Bake
+from ...data.store.bake_folder import BakeFolder
 from ...data.store.graph_folder import numbers
-from ...data.view_cells import read_rows
+from ...data.store.view_cells import read_rows
 
 COLUMNS = ("x", "y", "z", "yaw", "pitch", "t")
 # How somebody walks: eye above the floor [m], speed [m/s], and frames a second, as the papers'.
@@ -28,7 +28,7 @@ TURN_S = 0.4
 LEGS_MOST = 10_000
 
 
-def walk(bake: Bake, frames: int, seed: int = 0) -> CameraPath:
+def walk(bake: BakeFolder, frames: int, seed: int = 0) -> CameraPath:
     """A walk at constant speed to random places of the inhabitable cells, by the shortest way through the portals.
 
     In each cell the eye follows a cubic Bezier curve whose control points lie in the cell, so the curve does, and it
@@ -91,7 +91,7 @@ def _sampled(points: np.ndarray, run: np.ndarray, stands: np.ndarray, frames: in
 class _Maze:
     """Cells, and what joins them [m]."""
 
-    def __init__(self, bake: Bake) -> None:
+    def __init__(self, bake: BakeFolder) -> None:
         graph = bake.graph
         self.cells = graph.cells * bake.grid_m
         self.inhabitable = graph.inhabitable
@@ -214,7 +214,7 @@ def read_path(path: str | Path) -> CameraPath:
     return CameraPath(values[:, :3], values[:, 3], values[:, 4], values[:, 5])
 
 
-def potential_on(bake: Bake, path: CameraPath) -> tuple[np.ndarray, np.ndarray]:
+def potential_on(bake: BakeFolder, path: CameraPath) -> tuple[np.ndarray, np.ndarray]:
     """Objects that may be seen from each eye: those of the inhabitable cells that hold it.
 
     Returns:

@@ -5,7 +5,8 @@ import pyarrow.parquet as pq
 import pytest
 from viewcell import InputError
 from viewcell.data.store.claims import read_claims
-from viewcell.data.view_cells import ViewCells, as_graph
+from viewcell.data.store.view_cells import ViewCells
+from viewcell.data.view_cells import as_graph
 
 NAMES = ["table", "chair", "chair", "lamp", "12"]
 BOXES = np.array([[[k, 0, 0], [k + 1, 1, 1]] for k in range(3)])

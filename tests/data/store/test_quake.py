@@ -7,7 +7,7 @@ from builders.places import SHARED
 from viewcell import InputError, bake
 from viewcell.data.store.graph_folder import read_graph
 from viewcell.data.store.quake import UNIT_STEPS, axial_graph, is_axial, read_bsp, read_prt, write_prt
-from viewcell.verify.rays.windings import WindingWalk
+from viewcell.verify.rays.windings import WindingLines
 from viewcell.workbench.check.run import check
 
 # What the four rooms see: all but the first and the last see each other.
@@ -135,7 +135,7 @@ def test_lines_prove_the_same_whichever_way_windings_run(rooms, tmp_path):
     lines = [f"{line[0]}{' '.join('(' + corner.strip() for corner in line[:0:-1])}" for line in back]
     (tmp_path / "back.prt").write_text("\n".join(text[:3] + lines) + "\n")
     for path in (rooms[1], tmp_path / "back.prt"):
-        _, suspects = WindingWalk(read_prt(path)).sample(np.eye(4, dtype=bool), 2000, 0)
+        _, suspects = WindingLines(read_prt(path)).sample(np.eye(4, dtype=bool), 2000, 0)
         assert {(a, b) for a, b, *_ in suspects} == {(a, b) for a, b in np.argwhere(SEEN) if a != b}
 
 

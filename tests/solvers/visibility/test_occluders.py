@@ -5,15 +5,16 @@ import pytest
 from builders import random_solids
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
-from viewcell.data.store.database import load
-from viewcell.data.view_cells import as_graph
-from viewcell.solvers.visibility.engine import Sights
-from viewcell.solvers.visibility.occluders import seen_objects
+from viewcell.data.prepared import PreparedModel
+from viewcell.kernels.launch import CPU
+from viewcell.solvers.visibility.aim import Sights
+from viewcell.solvers.visibility.occluders import OccluderModel, seen_objects
 from viewcell.verify.rays.witness import visible_rows
-from viewcell.workbench.bake.run import Settings, bake, opaque_rectangles
+from viewcell.workbench.bake.run import bake
+from viewcell.workbench.bake.settings import Settings
+from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
 from viewcell.workbench.report.run import report
-from viewcell.workbench.verify import verify
 
 BOXES = [[1, 1, 0.3, 2, 2, 1.3], [3, 2.5, 0.4, 4.5, 3.5, 1.6], [6, 6.5, 0.5, 8, 7.5, 1.5], [2, 6, 0.2, 3, 7, 2.2]]
 
@@ -42,7 +43,7 @@ def by_occluders(office, cells, tmp_path_factory):
 
 def test_no_ray_finds_what_occluders_hide(by_occluders):
     assert 0 < by_occluders.potential_objects.sum() < 0.8 * by_occluders.potential_objects.size
-    assert verify(by_occluders, rays=400_000).ok
+    assert by_occluders.verify(rays=400_000).ok
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -53,7 +54,7 @@ def test_random_solids_hide_only_what_is_hidden(seed, tmp_path):
     boxes = np.concatenate([low, low + random.uniform(0.1, 1.5, (12, 3))], axis=1)
     settings = Settings(method="occluders", cells=write_cells(tmp_path / "cells.csv", boxes))
     made = bake(scene, tmp_path / "solids.bake", settings=settings)
-    result = verify(made, rays=300_000)
+    result = made.verify(rays=300_000)
     assert result.ok and made.potential_objects.sum() < made.potential_objects.size
     assert result.object_witnesses.confirmed == made.manifest["counts"]["object_pairs_seen"]
 
@@ -72,7 +73,7 @@ def test_both_is_at_least_as_tight_as_either(office, cells, by_occluders, tmp_pa
     )
     assert not (both.potential_objects & ~portals.potential_objects).any()
     assert not (both.potential_objects & ~by_occluders.potential_objects).any()
-    assert verify(both, rays=100_000).ok and verify(portals, rays=100_000).ok
+    assert both.verify(rays=100_000).ok and portals.verify(rays=100_000).ok
 
 
 def test_projection_points_hide_nothing_seen_and_less_than_occluders(office, cells, by_occluders, tmp_path):
@@ -82,7 +83,7 @@ def test_projection_points_hide_nothing_seen_and_less_than_occluders(office, cel
         assert made.potential_objects[rows["cell_id"].to_numpy(), rows["object_id"].to_numpy()].all()
     counts = made.potential_objects.sum(), by_occluders.potential_objects.sum()
     assert counts[1] < counts[0] < 0.8 * made.potential_objects.size
-    assert verify(made, rays=100_000).ok
+    assert made.verify(rays=100_000).ok
 
 
 def test_both_on_portal_cells_hides_no_less_and_sees_no_less(tmp_path):
@@ -93,14 +94,14 @@ def test_both_on_portal_cells_hides_no_less_and_sees_no_less(tmp_path):
     assert not (both.potential_objects & ~portals.potential_objects).any()
     assert not (both.potential_cells & ~portals.potential_cells).any()
     assert both.manifest["counts"]["object_pairs_seen"] >= portals.manifest["counts"]["object_pairs_seen"]
-    assert verify(both, rays=100_000).ok
+    assert both.verify(rays=100_000).ok
 
 
 def test_certified_bakes_hide_no_more(office, cells, by_occluders, tmp_path):
     made = bake(office, tmp_path / "c.bake", settings=Settings(method="occluders", cells=cells, certify=True))
     assert not (by_occluders.potential_objects & ~made.potential_objects).any()
     assert {p.name for p in made.folder.glob("*.parquet")} >= {"proofs.parquet", "leaves.parquet", "occluders.parquet"}
-    assert verify(made, rays=50_000).ok
+    assert made.verify(rays=50_000).ok
 
 
 def test_answers_do_not_depend_on_threads(office, cells, by_occluders, tmp_path):
@@ -114,11 +115,11 @@ def test_octree_refines_where_much_is_unknown_or_seen(office, tmp_path):
         return bake(office, tmp_path / "tree.bake", settings=settings, overwrite=True)
 
     coarse = made(depth=0)
-    triangles = np.bincount(office.triangles()[1])
+    triangles = office.triangle_counts
     load_of = coarse.potential_objects @ triangles
     some = made(depth=1, refine_triangles=int(np.median(load_of)), refine_gap=1.0)
     assert coarse.graph.cell_count < some.graph.cell_count
-    assert verify(some, rays=100_000).ok
+    assert some.verify(rays=100_000).ok
     sizes = np.unique(np.ptp(some.graph.cells, axis=1))
     assert sizes.tolist() == [3072, 6144]
     # What was coarse enough is as it was.
@@ -151,7 +152,7 @@ def test_a_scene_without_solids_is_baked_with_a_warning(tmp_path, capsys):
     scene = random_solids.scene_of_meshes([mesh, chair])
     made = bake(scene, tmp_path / "open.bake", settings=Settings(method="occluders", cells=cells))
     assert "no closed opaque solid" in made.manifest["warnings"][0]
-    assert verify(made, rays=100_000).ok
+    assert made.verify(rays=100_000).ok
 
 
 @pytest.mark.parametrize("damage", ["inverted", "doubled", "crossing", "torn"])
@@ -168,7 +169,7 @@ def test_damaged_meshes_lose_occlusion_never_safety(damage, tmp_path):
     cells = write_cells(tmp_path / "cells.csv", [[-2, 1, 0.5, -1, 2, 1.5], [-1.5, 1, 0.2, 1.5, 3, 2]])
     scene = random_solids.scene_of_meshes([wall, chair])
     made = bake(scene, tmp_path / "damaged.bake", settings=Settings(method="occluders", cells=cells))
-    assert verify(made, rays=100_000).ok
+    assert made.verify(rays=100_000).ok
     assert made.potential_objects[0, 1] == (damage == "torn")
 
 
@@ -209,9 +210,7 @@ def test_an_eye_beside_a_wall_sees_along_it():
     )
     scene = random_solids.scene_of_meshes([wall, behind, before])
     cells = np.array([[[-1024, 4096, 4096], [0, 5120, 5120]]], np.int32)
-    model, _ = Sights(scene, opaque_rectangles(scene), cells, "cpu").occlusion(
-        scene, as_graph(cells).cells, 0, 1, "cpu"
-    )
+    model = OccluderModel.of(Sights.of(PreparedModel(scene), cells, 0, CPU))
     rows, _ = seen_objects(model, np.array([0]))
     assert rows.target.tolist() == [0, 2] and rows.seen.all()
 
@@ -223,16 +222,16 @@ def test_report_shows_shrunk_occluders(by_occluders, tmp_path):
 
 
 def test_auto_takes_an_octree_for_very_large_models(tmp_path, monkeypatch):
-    monkeypatch.setattr("viewcell.workbench.bake.run.PORTAL_TRIANGLES", 10)
+    monkeypatch.setattr("viewcell.workbench.bake.cells.PORTAL_TRIANGLES", 10)
     floor, crate = random_solids.box([0, 0, -0.2], [9, 9, 0]), random_solids.box([4, 4, 0], [5, 5, 2.5])
     made = bake(random_solids.scene_of_meshes([floor, crate]), tmp_path / "open.bake", settings=Settings(depth=0))
     assert made.manifest["inhabitable_because"] == "octree" and not made.claims_cells
-    assert verify(made, rays=50_000).ok
+    assert made.verify(rays=50_000).ok
 
 
 def test_back_faces_are_counted_apart(by_occluders):
     counts = by_occluders.manifest["counts"]
-    sizes = np.bincount(by_occluders.scene.triangles()[1])
+    sizes = by_occluders.scene.triangle_counts
     assert counts["potential_triangles"] == (by_occluders.potential_objects @ sizes).sum()
     assert 0.05 < counts["back_facing_triangles"] / counts["potential_triangles"] < 0.6
 
@@ -243,4 +242,4 @@ def test_view_cells_beyond_the_portal_graph_are_refused(office, method, tmp_path
     with pytest.raises(InputError, match=r"within 2 m of the model, found cell 1 beyond"):
         bake(office, tmp_path / "no.bake", settings=Settings(method=method, cells=cells))
     made = bake(office, tmp_path / "yes.bake", settings=Settings(method="occluders", cells=cells))
-    assert verify(made, rays=100_000).ok and made.potential_objects[1].any()
+    assert made.verify(rays=100_000).ok and made.potential_objects[1].any()

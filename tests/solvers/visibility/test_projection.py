@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
-from viewcell.data.occludees import find_occludees
-from viewcell.data.opaque import opaque_planes
-from viewcell.data.patches import find_patches
+from viewcell.data.patches import find_patches, join_outlines, rectangle_outlines
+from viewcell.data.prepared import PreparedModel
 from viewcell.data.regions import find_regions
-from viewcell.data.scene import Role
+from viewcell.data.scene import OPAQUE
 from viewcell.data.solids import triangles_meet_boxes
+from viewcell.kernels.launch import Device
 from viewcell.solvers.visibility.projection import (
     VlodSettings,
     cluster_directions,
-    join_outlines,
-    rectangle_outlines,
     split_cell,
     vlod_hidden,
 )
@@ -32,15 +30,15 @@ class Office:
 
     def __init__(self, seed):
         scene = make_office(floors=1, rooms_per_side=3, seed=seed)
-        triangles, owners = scene.triangles()
-        solid = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
-        self.triangles, self.owners = triangles[solid], owners[solid]
-        regions = find_regions(scene, opaque_planes(triangles[scene.object_mask(Role.OCCLUDER)[owners]]))
+        model = PreparedModel(scene)
+        self.triangles, self.owners = scene.triangles(*OPAQUE)
         patches = find_patches(self.triangles, self.owners, least_area=0.2 * STEPS**2)
+        # Without rectangles of furniture: few occluders, so that where a projection point lies matters.
+        solids = ([corners for _, corners in model.closed_of(role)] for role in OPAQUE)
+        regions = find_regions(model.planes, *solids, scene.grid_m)
         self.occluders = join_outlines(rectangle_outlines(regions.boxes), patches)
-        occludees = find_occludees(scene)
-        self.parts, self.count = occludees.pieces, len(scene.objects)
-        self.part_owners = np.repeat(np.arange(self.count), np.diff(occludees.starts))
+        self.parts, self.count = model.occludees.pieces, len(scene.objects)
+        self.part_owners = model.occludees.owners
         self.rng = np.random.default_rng(seed)
         self.embree = embree_scene(self.triangles)
         self.cells = np.array([self.free_cell(size) for size in (500, 1000, 1000, 2200)])
@@ -121,7 +119,9 @@ def test_projection_points_hide_more_than_the_centre(office):
 def test_cells_threads_and_order_change_nothing(office, objective):
     settings = replace(CENTRE, clusters=6, objective=objective)
     together, _ = office.hidden(settings)
-    alone = np.concatenate([office.hidden(settings, office.cells[k : k + 1], threads=2)[0] for k in range(4)])
+    alone = np.concatenate(
+        [office.hidden(settings, office.cells[k : k + 1], device=Device(threads=2))[0] for k in range(4)]
+    )
     np.testing.assert_array_equal(together, alone)
 
 

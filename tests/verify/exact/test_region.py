@@ -12,9 +12,10 @@ from viewcell.data.errors import InputError
 from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
 from viewcell.data.verdict import Verdict
 from viewcell.kernels.shaft import launch_shaft
+from viewcell.verify.arithmetic import along, box_corners, cross, dot, minus, rational
 from viewcell.verify.exact.matrix_game import play
 from viewcell.verify.exact.region import _corner, _dual, box_faces, cell_faces, region_visible, segment_clear
-from viewcell.verify.exact.shadow import along, box_corners, dot, hides, in_hull, minus, occluder, rational
+from viewcell.verify.exact.umbra import hides, occluder
 from viewcell.verify.proofs.region import _hidden, holds, plane, side
 
 CELL = [[-60, -6, -6], [-50, 6, 6]]
@@ -91,15 +92,22 @@ def strictly_inside(point, faces):
     return True
 
 
+def in_polygon(polygon, n, x):
+    """Whether a point of its plane is in the closed convex polygon, either way round."""
+    pairs = zip(polygon, [*polygon[1:], polygon[0]], strict=True)
+    turns = [dot(n, cross(minus(b, a), minus(x, a))) for a, b in pairs]
+    return min(turns) >= 0 or max(turns) <= 0
+
+
 def meets(start, end, wall):
-    """Whether the closed segment meets the closed polygon, by the hull of its corners; None in its plane."""
+    """Whether the closed segment meets the closed polygon; None in its plane."""
     n, c = plane(wall)
     before, behind = dot(n, start) - c, dot(n, end) - c
     if before == behind == 0:
         return None
     if before * behind > 0:
         return False
-    return in_hull(wall, n, along(start, before / (before - behind), minus(end, start)))
+    return in_polygon(wall, n, along(start, before / (before - behind), minus(end, start)))
 
 
 def check(cell, target, walls, **options):
@@ -111,9 +119,9 @@ def check(cell, target, walls, **options):
     if answer.verdict is Verdict.VISIBLE:
         n, c = plane(target)
         assert strictly_inside(answer.start, faces) and dot(n, answer.start) != c == dot(n, answer.end)
-        # Inside the hull with every corner pulled in a little.
+        # Inside even with every corner pulled in a little.
         pulled = [along(corner, Fraction(1, 10**40), minus(answer.end, corner)) for corner in target]
-        assert in_hull(target, n, answer.end) and in_hull(pulled, n, answer.end)
+        assert in_polygon(target, n, answer.end) and in_polygon(pulled, n, answer.end)
         for wall in walls:
             assert meets(answer.start, answer.end, wall) is False or all(dot(n, corner) == c for corner in wall)
     return answer.verdict

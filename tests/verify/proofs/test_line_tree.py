@@ -15,9 +15,10 @@ from scipy.optimize import linprog
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.scene import GRID_M
-from viewcell.data.store.database import load
+from viewcell.kernels.blockers import blocker_tree
+from viewcell.kernels.launch import Device
 from viewcell.kernels.line_tree import launch_line_trees
-from viewcell.kernels.target import blocker_tree, launch_target_search
+from viewcell.kernels.target import launch_target_search
 from viewcell.verify.proofs.line_tree import (
     Blocker,
     check_certificates,
@@ -26,10 +27,11 @@ from viewcell.verify.proofs.line_tree import (
     has_certificates,
     hides,
 )
-from viewcell.workbench.bake.run import Settings, bake
+from viewcell.workbench.bake.run import bake
+from viewcell.workbench.bake.settings import Settings
+from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
 from viewcell.workbench.summary import summary
-from viewcell.workbench.verify import verify
 
 with_value, step = certified_bake.with_value, certified_bake.step
 
@@ -176,7 +178,7 @@ def test_many_trees_at_once_are_those_of_one_at_a_time(cases):
     rows = np.column_stack([np.arange(0, 60, 2), np.arange(1, 60, 2), np.zeros(30, int)])
     answers = launch_target_search(tree, ends, rows, cap=5000)
     rows, nodes = rows[answers.verdict == 0], answers.nodes[answers.verdict == 0]
-    together = launch_line_trees(tree, ends, rows, nodes, threads=2)
+    together = launch_line_trees(tree, ends, rows, nodes, device=Device(threads=2))
     for number, row in enumerate(rows):
         alone = launch_line_trees(tree, ends, row[None], nodes[number : number + 1])
         begin, end = together.starts[number : number + 2]
@@ -270,7 +272,7 @@ def test_certified_bakes_of_bare_graphs_hide_the_same(bakes):
 
 @pytest.mark.parametrize("name", ["house auto", "rooms", "cells both"])
 def test_certified_bakes_pass_every_check(name, bakes):
-    result = verify(load(bakes[name][1].folder), rays=20_000)
+    result = load(bakes[name][1].folder).verify(rays=20_000)
     assert result.ok and f"| certificates | {result.certificates.line()} |" in result.table()
 
 
@@ -424,14 +426,14 @@ def test_a_missing_table_is_bad_input(name, honest, tmp_path, capsys):
         check_certificates(load(folder))
     # It promised them.
     with pytest.raises(InputError, match="found nothing there"):
-        verify(load(folder), rays=0)
+        load(folder).verify(rays=0)
     assert main(["verify", str(folder), "--certificates"]) == 2
     assert name in capsys.readouterr().err
 
 
 def test_a_bake_without_certificates_is_not_asked_for_them(bakes):
     made = load(bakes["rooms"][0].folder)
-    assert not has_certificates(made) and verify(made, rays=0).certificates is None
+    assert not has_certificates(made) and made.verify(rays=0).certificates is None
     assert has_certificates(load(bakes["rooms"][1].folder))
     assert main(["verify", str(made.folder), "--certificates"]) == 2
 

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from builders import random_solids
 from viewcell.data.graph import OTHER_AXES
-from viewcell.data.opaque import decompose, opaque_planes
-from viewcell.data.regions import find_regions
-from viewcell.data.scene import Role
-from viewcell.solvers.visibility.engine import with_details
+from viewcell.data.opaque import decompose
+from viewcell.data.prepared import PreparedModel
 from viewcell.verify.proofs.opaque import OpaqueSurfaces, bounds_disc
 
 
@@ -79,8 +77,7 @@ def test_oblique_outlines_to_the_step():
 def test_regions_are_opaque_and_cannot_all_grow(seed):
     scene = random_solids.random_solids(seed)
     triangles, owners = scene.triangles()
-    axial = opaque_planes(triangles[scene.object_mask(Role.OCCLUDER)[owners]])
-    regions = find_regions(scene, with_details(scene, axial))
+    regions = PreparedModel(scene).regions
     surfaces, grown = OpaqueSurfaces(triangles, owners), 0
     for region, (axis, plane) in enumerate(zip(regions.axis, regions.plane, strict=True)):
         (u0, v0, t0), (u1, v1, t1) = regions.places[region], regions.places[region + 1]

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.errors import InputError
 from viewcell.data.scene import GRID_M
-from viewcell.data.store.database import load
 from viewcell.verify.proofs.boxes import in_boxes
 from viewcell.verify.proofs.line_tree import check_certificates
 from viewcell.verify.proofs.shaft import Disc, Region, leaf_holds, tiled
+from viewcell.workbench.baked import load
 
 with_value, step = certified_bake.with_value, certified_bake.step
 

@@ -10,7 +10,6 @@ import warp as wp
 from builders import random_solids, small_house
 from viewcell.data.errors import InputError
 from viewcell.data.scene import Role
-from viewcell.data.store.database import load
 from viewcell.verify.exact.sightline import Sightlines
 from viewcell.verify.rays.adjudicate import Judgement, sightline_end
 from viewcell.verify.rays.crossing import Crossings
@@ -20,7 +19,9 @@ from viewcell.verify.rays.guide import Hints, edge_table, pass_edges
 from viewcell.verify.rays.near_misses import certificate_hints, patch_margin, region_margin
 from viewcell.verify.rays.starts import cell_origins
 from viewcell.verify.rays.targets import Targets, sharp_edges
-from viewcell.workbench.bake.run import Settings, bake
+from viewcell.workbench.bake.run import bake
+from viewcell.workbench.bake.settings import Settings
+from viewcell.workbench.baked import load
 from viewcell.workbench.bench import falsify as bench
 from viewcell.workbench.verify import make_judge
 

@@ -9,11 +9,11 @@ from builders.random_buildings import scene_of, tetrahedron
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.scene import Role
-from viewcell.data.store.database import load
 from viewcell.verify.exact.sightline import Sight, Sightlines
 from viewcell.verify.rays.witness import visible_rows
-from viewcell.workbench.bake import run as baking
-from viewcell.workbench.bake.run import Settings
+from viewcell.workbench.bake import blocks
+from viewcell.workbench.bake.settings import Settings
+from viewcell.workbench.baked import load
 
 METRE = 1024
 TABLES = ("cell_to_cell", "cell_to_object")
@@ -57,7 +57,7 @@ def check_two_sided(bake, rays):
     both = bake.potential_cells[np.ix_(inhabitable, inhabitable)]
     np.testing.assert_array_equal(both, both.T, "A sees B exactly when B sees A")
     assert both.diagonal().all()
-    result = viewcell.verify(bake, rays=rays)
+    result = bake.verify(rays=rays)
     assert result.wrong_hidden == 0 and result.refuted == 0, result.table()
     seen = sum(visible_rows(getattr(bake, name)).num_rows for name in TABLES)
     assert result.cell_witnesses.confirmed + result.object_witnesses.confirmed == seen
@@ -82,7 +82,7 @@ def test_bare_graph_is_two_sided(tmp_path):
 
 @pytest.mark.parametrize(("threads", "block"), [(1, 24), (2, 24), (2, 1), (1, 3), (2, 5)])
 def test_repeats_threads_and_blocks_change_nothing(threads, block, office, office_bake, tmp_path, monkeypatch):
-    monkeypatch.setattr(baking, "BLOCK", block)
+    monkeypatch.setattr(blocks, "BLOCK", block)
     assert same_tables(viewcell.bake(office, tmp_path / "again", threads=threads), office_bake)
 
 
@@ -95,10 +95,10 @@ class Stopped(Exception):
     pass
 
 
-def stop_after(blocks, monkeypatch):
-    """Interrupt a bake before it saves one more block than these."""
-    save = baking._Store.save
-    left = [blocks]
+def stop_after(count, monkeypatch):
+    """Interrupt a bake before it saves one more block than so many."""
+    save = blocks.Store.save
+    left = [count]
 
     def counted(self, number, part):
         if not left[0]:
@@ -106,13 +106,13 @@ def stop_after(blocks, monkeypatch):
         left[0] -= 1
         save(self, number, part)
 
-    monkeypatch.setattr(baking._Store, "save", counted)
+    monkeypatch.setattr(blocks.Store, "save", counted)
 
 
 @pytest.mark.parametrize("lost", [None, 0, 1])
 def test_resuming_equals_never_stopping(lost, office, office_bake, tmp_path, monkeypatch):
     """Stopped after two blocks; one of them is lost or cut short on top."""
-    monkeypatch.setattr(baking, "BLOCK", 3)
+    monkeypatch.setattr(blocks, "BLOCK", 3)
     with monkeypatch.context() as patch:
         stop_after(2, patch)
         with pytest.raises(Stopped):
@@ -120,21 +120,21 @@ def test_resuming_equals_never_stopping(lost, office, office_bake, tmp_path, mon
     assert not (tmp_path / "office").exists()
     partial = next(tmp_path.iterdir())
     if lost == 0:
-        (partial / "0.block").unlink()
+        (partial / "0.arrow").unlink()
     if lost == 1:
-        (partial / "1.block").write_bytes((partial / "1.block").read_bytes()[:100])
+        (partial / "1.arrow").write_bytes((partial / "1.arrow").read_bytes()[:100])
     assert same_tables(viewcell.bake(office, tmp_path / "office"), office_bake)
     assert [path.name for path in tmp_path.iterdir()] == ["office"]
 
 
 def test_blocks_of_another_size_are_not_taken_for_ours(office, office_bake, tmp_path, monkeypatch):
     """What an older version left behind may be cut into blocks differently."""
-    monkeypatch.setattr(baking, "BLOCK", 3)
+    monkeypatch.setattr(blocks, "BLOCK", 3)
     with monkeypatch.context() as patch:
         stop_after(2, patch)
         with pytest.raises(Stopped):
             viewcell.bake(office, tmp_path / "office")
-    monkeypatch.setattr(baking, "BLOCK", 5)
+    monkeypatch.setattr(blocks, "BLOCK", 5)
     assert same_tables(viewcell.bake(office, tmp_path / "office"), office_bake)
 
 
@@ -331,7 +331,7 @@ def test_verify_refutes_a_bake_with_a_row_taken_out(office_bake, tmp_path):
     assert spoiled.scene is not None and spoiled.potential_cells.any()
     spoiled.__dict__["cell_to_object"] = table.filter(kept)
     spoiled.folder = tmp_path / "spoiled"
-    assert viewcell.verify(spoiled, rays=20_000).wrong_hidden == 1
+    assert spoiled.verify(rays=20_000).wrong_hidden == 1
 
 
 @pytest.mark.slow

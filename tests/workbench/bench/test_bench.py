@@ -9,6 +9,8 @@ import pytest
 from builders import four_rooms
 from scipy.stats import linregress
 from viewcell.data.errors import InputError
+from viewcell.data.verdict import Verdict
+from viewcell.kernels.launch import CPU
 from viewcell.workbench.bench import against, growth, suite
 from viewcell.workbench.bench import run as benches
 from viewcell.workbench.bench.rows import meshes as rows_meshes
@@ -124,7 +126,7 @@ def answered(case, change):
 
 
 def all_hidden(found):
-    return replace(found, verdict=np.zeros_like(found.verdict))
+    return replace(found, verdict=np.full_like(found.verdict, Verdict.HIDDEN))
 
 
 @pytest.mark.parametrize(
@@ -139,12 +141,12 @@ def all_hidden(found):
     ],
 )
 def test_a_judge_sees_what_is_wrongly_hidden(small, kernel, n, change):
-    case = make_cases(kernel, n, "cpu")[0]
+    case = make_cases(kernel, n, CPU)[0]
     assert answered(case, change).wrong_hidden > 0
 
 
 def test_judges_of_shadows_see_what_is_wrongly_hidden():
-    umbra, shrink = make_cases("shadow", 100, "cpu")
+    umbra, shrink = make_cases("shadow", 100, CPU)
     moved = umbra.work()
     moved.limits[:, 3] = moved.planes[:, 3] = moved.far[:] = -1e9
     assert umbra.judge(moved).wrong_hidden > 0
@@ -154,35 +156,35 @@ def test_judges_of_shadows_see_what_is_wrongly_hidden():
 
 
 def test_the_judge_of_maps_sees_what_is_wrongly_hidden(monkeypatch):
-    case = make_cases("coverage", 50, "cpu")[0]
-    monkeypatch.setattr(rows_shadow, "launch_occludees", lambda maps, boxes, rows: np.ones(len(rows), np.uint8))
+    case = make_cases("coverage", 50, CPU)[0]
+    monkeypatch.setattr(rows_shadow, "launch_occludees", lambda maps, boxes, rows: np.full(len(rows), Verdict.HIDDEN))
     assert case.judge(case.work()).wrong_hidden > 0
 
 
 def test_judges_of_rays_and_deviation_see_errors():
-    rays = make_cases("rays", 300, "cpu")[0]
+    rays = make_cases("rays", 300, CPU)[0]
     assert answered(rays, np.logical_not).wrong_visible > 0
     assert answered(rays, np.zeros_like).unknown_pct > 0
-    deviation = make_cases("deviation", 80, "cpu")[0]
+    deviation = make_cases("deviation", 80, CPU)[0]
     assert answered(deviation, lambda found: replace(found, upper=found.upper / 2)).error > 0.5
 
 
 def test_judges_of_solvers_refuse_false_bounds():
-    select = make_cases("select", 30, "cpu")[0]
+    select = make_cases("select", 30, CPU)[0]
     with pytest.raises(AssertionError, match="bound"):
         answered(select, lambda found: replace(found, bound=found.bound * 0.9))
     with pytest.raises(AssertionError, match="at most"):
         answered(select, lambda found: replace(found, cost=found.cost * 2))
-    point = make_cases("projection_point", 3, "cpu")[0]
+    point = make_cases("projection_point", 3, CPU)[0]
     assert answered(point, lambda found: replace(found, point=found.point + 100.0)).error > 0.01
 
 
 def test_plain_references_agree_with_the_kernels():
     random = np.random.default_rng(0)
-    shafts = make_cases("shaft", 60, "cpu")[0]
-    hidden, unsplit = shafts.work().verdict == 0, shafts.reference()
+    shafts = make_cases("shaft", 60, CPU)[0]
+    hidden, unsplit = shafts.work().verdict == Verdict.HIDDEN, shafts.reference()
     assert not (unsplit & ~hidden[: len(unsplit)]).any() and unsplit.any()
-    backface = make_cases("backface", 60, "cpu")[0]
+    backface = make_cases("backface", 60, CPU)[0]
     # Only closed shells are culled.
     culled = backface.work()[0]
     np.testing.assert_array_equal(culled[culled > 0], np.array(backface.reference())[culled > 0])
@@ -211,13 +213,13 @@ def test_plain_references_agree_with_the_kernels():
 def test_a_row_without_truth_is_none():
     case = Case("stab", "", "kernel", 1, int, lambda _: Errors(), "int", int, 1.0, [])
     with pytest.raises(ValueError, match="measures something"):
-        measure(case, "cpu")
+        measure(case, CPU)
 
 
 def test_a_row_names_where_its_work_ran(small):
-    elsewhere = replace(make_cases("stab", 40, "cpu")[0], device="gpu")
-    assert measure(elsewhere, "cpu")[0].device == "gpu"
-    assert measure(replace(elsewhere, device=None), "cpu")[0].device == "cpu"
+    elsewhere = replace(make_cases("stab", 40, CPU)[0], device="gpu")
+    assert measure(elsewhere, CPU)[0].device == "gpu"
+    assert measure(replace(elsewhere, device=None), CPU)[0].device == "cpu"
 
 
 def test_a_broken_kernel_fails(small, monkeypatch, capsys, tmp_path):
@@ -239,7 +241,7 @@ def test_graphs_are_flooded_too(small, tmp_path):
 
 def test_a_search_that_is_cut_short_still_refutes(monkeypatch):
     monkeypatch.setattr(rows_portals, "STEPS", 1)
-    case = make_cases("flood", 100, "cpu")[0]
+    case = make_cases("flood", 100, CPU)[0]
     errors = case.judge(case.work())
     assert errors.wrong_hidden == 0 and errors.wrong_visible is None
     assert case.judge((np.eye(case.n, dtype=bool),) * 2).wrong_hidden > 0

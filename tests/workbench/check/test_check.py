@@ -15,10 +15,10 @@ from builders import four_rooms, small_house
 from scipy.spatial import cKDTree
 from viewcell import InputError
 from viewcell.data.scene import Role
+from viewcell.data.store.bake_folder import cells_table
 from viewcell.data.store.claims import Claims
-from viewcell.data.store.database import cells_table
 from viewcell.data.store.scene_folder import write_scene
-from viewcell.data.view_cells import view_cells
+from viewcell.data.store.view_cells import view_cells
 from viewcell.verify.check_result import WrongPair
 from viewcell.verify.exact.sightline import Sightlines
 from viewcell.verify.rays.clearance import clearances

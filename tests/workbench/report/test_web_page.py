@@ -264,7 +264,7 @@ def test_a_bare_graph_and_an_empty_one_have_pages(tmp_path):
 
 
 def test_the_command_writes_the_page(house, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("viewcell.data.store.database.load", lambda folder: house)
+    monkeypatch.setattr("viewcell.workbench.baked.load", lambda folder: house)
     out = tmp_path / "report"
     assert main(["report", "x", "--cells", "0", "--out", str(out)]) == 0
     assert capsys.readouterr().out.splitlines() == [str(out / "report.md"), str(out / "report.html")]

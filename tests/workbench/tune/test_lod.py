@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from viewcell.data.errors import InputError
-from viewcell.data.store.database import load
+from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
 from viewcell.workbench.tune import lod as tuning
 from viewcell.workbench.tune.lod import CHOOSERS, HIGHS, Outcome, recommend, tune_lod
 from viewcell.workbench.walk.path import RATE, SPEED, potential_on, read_path, walk
 
-FAST = ["--frames", "12", "--resolution", "64x48", "--no-progress"]
+FAST = ["--frames", "12", "--image", "64x48", "--no-progress"]
 FILES = ["samples.csv", "tune-lod.html", "tune-lod.json", "tune-lod.png"]
 
 
@@ -222,7 +222,7 @@ def test_settings_come_from_the_file_unless_given(graph, tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('{"sede": 1}', "expected keys among threshold_m2, seed"),
+        ('{"sede": 1}', "expected keys among doors, seal"),
         ('{"seed": 1.5}', "expected seed to be like 0, found 1.5"),
         ('{"seed": true}', "expected seed to be like 0, found True"),
         ('{"certify": 1}', "expected certify to be like false, found 1"),
@@ -250,8 +250,8 @@ def test_bake_refuses_settings_that_it_does_not_know(text, said, graph, tmp_path
         (["--budget-ms", "nan"], "budget: expected milliseconds above 0"),
         (["--budget-ms", "1e-9"], "which an empty frame takes"),
         (["--budget-ms", "ten"], "expected a number"),
-        (["--resolution", "640"], "expected WIDTHxHEIGHT"),
-        (["--resolution", "0x5"], "expected at least 1x1"),
+        (["--image", "640"], "expected WIDTHxHEIGHT"),
+        (["--image", "0x5"], "expected at least 1x1"),
         (["--fov", "180"], "fov: expected degrees"),
         (["--frames", "0"], "expected a whole number from 1"),
         (["--always", "IfcDragon"], "kinds: expected"),

@@ -5,9 +5,10 @@ import re
 
 import pytest
 from viewcell.data.buildings.office import make_office
-from viewcell.data.store.database import load
-from viewcell.workbench.bake.run import Settings, bake
+from viewcell.workbench.bake.run import bake
+from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.bake.settings_file import read_settings
+from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
 from viewcell.workbench.tune import points as tune_points
 from viewcell.workbench.tune.page import Candidate, pareto_front

@@ -10,6 +10,7 @@ from ....data.camera import NEAR_M, CameraPath, Screen
 from ....kernels import deviation as deviation_kernels
 from ....kernels import raster as raster_kernels
 from ....kernels.deviation import Deviation, launch_deviation
+from ....kernels.launch import Device
 from ....kernels.raster import Images, device_triangles, launch_raster
 from ....verify.exact.raster import first_hit
 from ....verify.rays.embree import embree_scene
@@ -24,7 +25,7 @@ CLEAR, LEAD = 1.0e-6, 1.0e-9
 SAMPLES = 300
 
 
-def raster_cases(n: int, device: str) -> list[Case]:
+def raster_cases(n: int, device: Device) -> list[Case]:
     """One picture of n pixels, 4:3, of an office without furniture; wrong pixels are those that exact rays refute."""
     scene = make_office(floors=1, rooms_per_side=2, furnished=False, seed=4)
     screen = Screen(round((n * 4 / 3) ** 0.5), round((n * 3 / 4) ** 0.5), 60.0)
@@ -88,7 +89,7 @@ def near_ray(camera: np.ndarray, at: np.ndarray, margin: float) -> np.ndarray:
     return (front & near) | (~front & (depth > 0).any(axis=(1, 2)))
 
 
-def deviation_cases(n: int, device: str) -> list[Case]:
+def deviation_cases(n: int, device: Device) -> list[Case]:
     """A sphere of n triangles, dented at random, and the sphere of a quarter as many; in metres."""
     steps = round(np.log(n / 20) / np.log(4))
     fine, coarse = (trimesh.creation.icosphere(subdivisions=level, radius=1.0) for level in (steps, steps - 1))

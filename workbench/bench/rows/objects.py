@@ -5,16 +5,19 @@ from functools import cache, partial
 import numpy as np
 
 from ....data.buildings.office import make_office
-from ....data.opaque import opaque_planes
+from ....data.prepared import PreparedModel
 from ....data.regions import Regions
-from ....data.scene import Role, Scene
+from ....data.scene import OPAQUE, Scene
+from ....data.solids import closed_elements
+from ....data.verdict import Verdict
 from ....kernels import backface as backface_kernels
 from ....kernels import shaft as shaft_kernels
 from ....kernels import sightline as sightline_kernels
 from ....kernels.backface import build_cones, launch_backface
-from ....kernels.shaft import ShaftAnswers, device_shields, launch_shaft
+from ....kernels.launch import Device
+from ....kernels.shaft import ShaftAnswers, launch_shaft
+from ....kernels.shields import device_shields
 from ....kernels.sightline import device_triangles, launch_confirm
-from ....solvers.visibility.engine import find_occluders
 from ....verify.exact.backface import back_facing, outward_triangles
 from ....verify.exact.sightline import Sight, Sightlines
 from ....verify.rays.embree import embree_scene
@@ -38,10 +41,7 @@ def office() -> Scene:
 @cache
 def opaque_triangles() -> tuple[np.ndarray, np.ndarray]:
     """The office's opaque triangles and their owners."""
-    scene = office()
-    triangles, owners = scene.triangles()
-    opaque = scene.object_mask(Role.OCCLUDER, Role.DETAIL)[owners]
-    return triangles[opaque], owners[opaque]
+    return office().triangles(*OPAQUE)
 
 
 @cache
@@ -62,11 +62,11 @@ def boxes_in_spaces(
     return np.stack([low, low + np.maximum(extent, 1)], axis=1).astype(np.int32)
 
 
-def backface_cases(n: int, device: str) -> list[Case]:
+def backface_cases(n: int, device: Device) -> list[Case]:
     """Triangles of n (view cell, object) pairs that turn their backs; error-free is exactly as many as the twin."""
     random = np.random.default_rng(n)
     triangles, owners = opaque_triangles()
-    cones = build_cones(office())
+    cones = build_cones(closed_elements(office()), office().triangle_counts)
     cells = boxes_in_spaces(random, 64, (0.5, 2.0))
     rows = np.column_stack([random.integers(0, len(cells), n), random.choice(np.unique(owners), n)])
     solid = triangles.astype(float)
@@ -103,14 +103,11 @@ def numpy_backface(triangles: np.ndarray, cell: np.ndarray) -> int:
     return int((((farthest - a) * normal).sum(axis=1) <= 0).sum())
 
 
-def shaft_cases(n: int, device: str) -> list[Case]:
+def shaft_cases(n: int, device: Device) -> list[Case]:
     """N pairs of a view cell and a small box, each in a room; judged by exact segments from outside all solids."""
     random = np.random.default_rng(n)
-    scene = office()
-    triangles, owners = scene.triangles()
-    opaque = opaque_planes(triangles[scene.object_mask(Role.OCCLUDER)[owners]])
-    regions, patches = find_occluders(scene, opaque)
-    shields = device_shields(regions, patches, device)
+    model = PreparedModel(office())
+    shields = device_shields(model.regions, model.patches, device)
     boxes = np.concatenate([boxes_in_spaces(random, n, (0.5, 1.5)), boxes_in_spaces(random, n, (0.1, 0.6))])
     rows = np.arange(2 * n).reshape(2, n).T
     return [
@@ -122,7 +119,7 @@ def shaft_cases(n: int, device: str) -> list[Case]:
             work=lambda: launch_shaft(shields, boxes, rows, smallest=SMALLEST, cap=PIECES, device=device),
             judge=partial(judge_shafts, boxes, rows[:JUDGED_SHAFTS], random),
             baseline="NumPy, unsplit",
-            reference=lambda: numpy_shafts(regions, boxes, rows[:REFERENCE_SHAFTS]),
+            reference=lambda: numpy_shafts(model.regions, boxes, rows[:REFERENCE_SHAFTS]),
             share=min(n, REFERENCE_SHAFTS) / n,
             modules=[shaft_kernels.__name__],
         )
@@ -137,7 +134,7 @@ def judge_shafts(boxes: np.ndarray, rows: np.ndarray, random: np.random.Generato
         for side, part in zip(rows.T, share, strict=True)
     )
     clear = sightlines().outside_solids(origins) & (sightlines().check(origins, ends) == Sight.CLEAR)
-    return sampled_errors(found.verdict[: len(rows)] == 0, clear.reshape(len(rows), -1).any(axis=1))
+    return sampled_errors(found.verdict[: len(rows)] == Verdict.HIDDEN, clear.reshape(len(rows), -1).any(axis=1))
 
 
 def numpy_shafts(regions: Regions, boxes: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -163,7 +160,7 @@ def _is_axis(axis: np.ndarray) -> np.ndarray:
     return (axis[:, None] == np.arange(3))[:, None, None]
 
 
-def rays_cases(n: int, device: str) -> list[Case]:
+def rays_cases(n: int, device: Device) -> list[Case]:
     """N random segments in the office: which are clear. Embree answers the same in float32, and may be wrong."""
     random = np.random.default_rng(n)
     triangles, owners = opaque_triangles()

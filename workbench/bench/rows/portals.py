@@ -11,12 +11,12 @@ from ....data.errors import InputError
 from ....data.graph import OTHER_AXES, CellGraph
 from ....data.store.graph_folder import read_graph
 from ....data.verdict import Verdict
-from ....kernels import flood, stab_batch, target
-from ....kernels import trace as walk
+from ....kernels import flood, stab_batch, target, trace
 from ....kernels.flood import launch_flood
+from ....kernels.launch import Device
 from ....kernels.stab_batch import StabAnswers, launch_stab
 from ....kernels.target import TargetAnswers, launch_target_search
-from ....solvers.visibility.engine import Engine
+from ....solvers.visibility.graph_engine import GraphEngine
 from ....verify.exact.stab import stab
 from ..stab import margin_by_scipy, sequences
 from ..suite import Case, Errors
@@ -33,7 +33,7 @@ OCTANTS = tuple(product((1, -1), repeat=3))
 HALF = tuple(i for i in range(8) if i % 2 == 0)
 
 
-def stab_cases(n: int, device: str) -> list[Case]:
+def stab_cases(n: int, device: Device) -> list[Case]:
     """One octant for n lists of boxes; the truth is the exact twin's."""
     boxes, signs = sequences(n, BOXES, seed=BOXES)
     few = boxes[:LP_LISTS]
@@ -57,7 +57,7 @@ def judge_stabs(boxes: np.ndarray, found: StabAnswers) -> Errors:
     """Verdicts of the first lists against exact ones."""
     truth = np.array([stab(one.astype(np.int64), (1, 1, 1)).verdict is Verdict.VISIBLE for one in boxes])
     verdict = found.verdict[: len(boxes)]
-    return verdict_errors(verdict == 0, verdict == 1, truth)
+    return verdict_errors(verdict == Verdict.HIDDEN, verdict == Verdict.VISIBLE, truth)
 
 
 def verdict_errors(hidden: np.ndarray, visible: np.ndarray, truth: np.ndarray) -> Errors:
@@ -170,7 +170,7 @@ def spread(count: int, cells: int) -> np.ndarray:
     return np.unique(np.linspace(0, cells - 1, count + 2).astype(int)[1:-1])
 
 
-def flood_cases(n: int, device: str) -> list[Case]:
+def flood_cases(n: int, device: Device) -> list[Case]:
     """All cells from all cells of random rooms, and of rooms with openings nearly as large as their walls."""
     return [
         flood_case(random_rooms(n, seed=n), "rooms", device),
@@ -178,7 +178,7 @@ def flood_cases(n: int, device: str) -> list[Case]:
     ]
 
 
-def graph_cases(folder: Path, device: str) -> list[Case]:
+def graph_cases(folder: Path, device: Device) -> list[Case]:
     """The same for graphs in folders: FOLDER itself, or those in it.
 
     Raises:
@@ -195,14 +195,14 @@ def graph_cases(folder: Path, device: str) -> list[Case]:
     return cases
 
 
-def flood_case(graph: CellGraph, scene: str, device: str, plain_sources: int = PLAIN_SOURCES) -> Case:
+def flood_case(graph: CellGraph, scene: str, device: Device, plain_sources: int = PLAIN_SOURCES) -> Case:
     """The engine on a bare graph whose cells are all inhabitable, beside the plain kernel.
 
     The truth is an exact search from some cells.
     """
-    engine = Engine(None, graph, None, seed=0, threads=1, device=device)
+    engine = GraphEngine(graph, device=device)
     sources = np.arange(graph.cell_count)
-    plain = Engine(None, graph, None, seed=0, threads=1, device="cpu").model.device_graph
+    plain = GraphEngine(graph).model.device_graph
     judged, few = spread(JUDGED_SOURCES, graph.cell_count), spread(plain_sources, graph.cell_count)
 
     def judge(found: tuple[np.ndarray, np.ndarray]) -> Errors:
@@ -226,15 +226,15 @@ def flood_case(graph: CellGraph, scene: str, device: str, plain_sources: int = P
         baseline="plain search",
         reference=lambda: launch_flood(plain, few, HALF, cap=PLAIN_CAP),
         share=len(few) / graph.cell_count,
-        modules=[target.__name__, flood.__name__, walk.__name__],
+        modules=[target.__name__, flood.__name__, trace.__name__],
     )
 
 
-def target_cases(n: int, device: str) -> list[Case]:
+def target_cases(n: int, device: Device) -> list[Case]:
     """The target search on the same rooms, from every cell to every other."""
     graph = random_rooms(n, seed=n)
-    model = Engine(None, graph, None, seed=0, threads=1, device=device).model
-    plain = Engine(None, graph, None, seed=0, threads=1, device="cpu").model.device_graph
+    model = GraphEngine(graph, device=device).model
+    plain = GraphEngine(graph).model.device_graph
     cells, few = np.arange(graph.cell_count), spread(PLAIN_SOURCES, graph.cell_count)
     pairs = np.stack(np.meshgrid(cells, cells, indexing="ij"), axis=-1).reshape(-1, 2)
     rows = np.column_stack([pairs, np.zeros(len(pairs), int)])[pairs[:, 0] != pairs[:, 1]]
@@ -245,7 +245,8 @@ def target_cases(n: int, device: str) -> list[Case]:
         hidden, visible = np.zeros((2, len(sources), graph.cell_count), bool)
         visible[np.arange(len(sources)), sources] = True
         at = np.searchsorted(sources, rows[judged, 0]), rows[judged, 1]
-        hidden[at], visible[at] = found.verdict[judged] == 0, found.verdict[judged] == 1
+        verdict = found.verdict[judged]
+        hidden[at], visible[at] = verdict == Verdict.HIDDEN, verdict == Verdict.VISIBLE
         return judge_sources(graph, hidden, visible, sources)
 
     return [

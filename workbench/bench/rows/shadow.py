@@ -5,13 +5,19 @@ from functools import partial
 import numpy as np
 
 from ....data.patches import Patches
+from ....data.verdict import Verdict
 from ....kernels import coverage as coverage_kernels
-from ....kernels import shadow as shadow_kernels
+from ....kernels import shrink as shrink_kernels
+from ....kernels import umbra as umbra_kernels
 from ....kernels.coverage import CubeMaps, launch_coverage
+from ....kernels.launch import Device
 from ....kernels.occludee import launch_occludees
-from ....kernels.shadow import USABLE, Polygons, Umbras, launch_shrink, launch_umbra
-from ....verify.exact.shadow import hides, occluder, rational, shrunk
+from ....kernels.shrink import Polygons, launch_shrink
+from ....kernels.umbra import USABLE, Umbras, launch_umbra
+from ....verify.arithmetic import rational
+from ....verify.exact.shrink import shrunk
 from ....verify.exact.sightline import Sight, Sightlines
+from ....verify.exact.umbra import hides, occluder
 from ..suite import Case, Errors
 
 JUDGED_PAIRS, POINTS_A_PAIR = 40, 8
@@ -46,7 +52,7 @@ def parallelograms(random: np.random.Generator, count: int) -> Patches:
     )
 
 
-def shadow_cases(n: int, device: str) -> list[Case]:
+def shadow_cases(n: int, device: Device) -> list[Case]:
     """N view cells, each with an outline before it: its umbra, and what is left of it from a point of the cell."""
     random = np.random.default_rng(n)
     outlines = parallelograms(random, n)
@@ -88,7 +94,7 @@ def shadow_cases(n: int, device: str) -> list[Case]:
         for k, row in enumerate(few):
             numpy_shrink(corners[row].astype(float), planes[k], points[row])
 
-    common = {"n": n, "baseline": "NumPy float64", "modules": [shadow_kernels.__name__]}
+    common = {"n": n, "baseline": "NumPy float64", "modules": [umbra_kernels.__name__, shrink_kernels.__name__]}
     return [
         Case(
             kernel="shadow",
@@ -171,7 +177,7 @@ def numpy_shrink(polygon: np.ndarray, planes: np.ndarray, point: np.ndarray) -> 
     return polygon
 
 
-def coverage_cases(n: int, device: str) -> list[Case]:
+def coverage_cases(n: int, device: Device) -> list[Case]:
     """A cube map of n triangles about a point; what it covers is judged by exact segments to small boxes behind."""
     random = np.random.default_rng(n)
     size = 16_000 / np.sqrt(n)
@@ -202,7 +208,8 @@ def judge_coverage(triangles: np.ndarray, eye: np.ndarray, random: np.random.Gen
     away = random.normal(size=(JUDGED_BOXES, 3))
     low = np.round(away * random.uniform(7000, 12_000, (JUDGED_BOXES, 1)) / np.linalg.norm(away, axis=1)[:, None])
     boxes = np.stack([low, low + random.integers(20, 200, (JUDGED_BOXES, 3))], axis=1).astype(np.int32)
-    hidden = launch_occludees(maps, boxes, np.column_stack([np.arange(JUDGED_BOXES), owners_of(boxes)])).astype(bool)
+    rows = np.column_stack([np.arange(JUDGED_BOXES), owners_of(boxes)])
+    hidden = launch_occludees(maps, boxes, rows) == Verdict.HIDDEN
     share = random.random((JUDGED_BOXES, SEGMENTS_A_BOX, 3))
     share[:, :8] = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
     ends = (boxes[:, :1] + share * (boxes[:, 1:] - boxes[:, :1])).reshape(-1, 3)

@@ -7,6 +7,7 @@ import jax
 import numpy as np
 
 from ....kernels import select as select_kernels
+from ....kernels.launch import Device
 from ....kernels.select import Selections, launch_select
 from ....solvers.projection_point import solve_points
 from ....solvers.referees import cone_point
@@ -23,7 +24,7 @@ PROVED_OBJECTS = 1_000
 ROWS, PROVED_POINTS, CLARABEL_POINTS = 100, 10, 20
 
 
-def select_cases(n: int, device: str) -> list[Case]:
+def select_cases(n: int, device: Device) -> list[Case]:
     """Levels of n objects in 4 frames; error is how far below the optimum one frame is, relative to it."""
     asked = problem(n, FRAMES, SHARE, seed=n)
     few = problem(min(n, PROVED_OBJECTS), 1, SHARE, seed=n)
@@ -72,7 +73,7 @@ def judge_selection(asked: Problem, found: Selections) -> Errors:
     return Errors(gap=float(found.gap.max()), error=error)
 
 
-def projection_point_cases(n: int, device: str) -> list[Case]:
+def projection_point_cases(n: int, device: Device) -> list[Case]:
     """Projection points of n programmes; the gap is proved in rationals, the error is the violation [m]."""
     # JAX takes a device of its own.
     del device

@@ -1,32 +1,20 @@
-"""Umbras, shrunk occluders and grown holes: published vectors, and every claim against rationals."""
+"""Umbras: published vectors, and every claim against rationals."""
 
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from builders import outlines
-from builders.outlines import area_of, outline_table, random_scene
+from builders.outlines import bent_quadrilateral, outline_table, random_scene
 from builders.places import HARD_CASES
 from viewcell.data.errors import InputError
 from viewcell.data.patches import find_patches
-from viewcell.kernels.shadow import BENT, STRADDLES, TOUCHES, USABLE, launch_grow_hole, launch_shrink, launch_umbra
-from viewcell.verify.arithmetic import MISS, crossing_kind
-from viewcell.verify.exact.shadow import (
-    along,
-    box_corners,
-    dot,
-    grown_hole,
-    hides,
-    in_hull,
-    load_shadow_cases,
-    minus,
-    occluder,
-    rational,
-    recession,
-    shrunk,
-    umbra,
-    winds,
-)
+from viewcell.kernels.launch import Device
+from viewcell.kernels.umbra import BENT, STRADDLES, TOUCHES, USABLE, launch_umbra
+from viewcell.verify.arithmetic import box_corners, dot, minus, rational
+from viewcell.verify.cases.case_file import load_shadow_cases
+from viewcell.verify.exact.segment import MISS, crossing_kind
+from viewcell.verify.exact.umbra import hides, occluder, recession, umbra, winds
 
 CASES = {c.name: c for c in load_shadow_cases(HARD_CASES / "shadow.txt")}
 
@@ -156,11 +144,6 @@ def test_no_eye_in_the_cell_sees_into_the_umbra_many():
     assert check_eyes(4, 6000) > 10_000
 
 
-def bent_quadrilateral(height):
-    triangles = outlines.surface(1, 1, lambda u, v: (u * 100, v * 100, height * u * v))
-    return find_patches(triangles, np.zeros(2), least_area=1.0, cos_limit=0.2, axial=True)
-
-
 def bent_scenes():
     """Bent outlines and cells; in the last the separating planes bind."""
     bent = bent_quadrilateral(60)
@@ -207,134 +190,16 @@ def test_a_touching_cell_has_an_umbra_only_where_the_outline_covers_the_contact(
     assert seen == {TOUCHES, USABLE}
 
 
-def project(exact, point):
-    """The point moved onto the plane of the outline along its normal, exactly."""
-    return along(point, -exact.depth(point) / dot(exact.normal, exact.normal), exact.normal)
-
-
-def polygons_of(polygons):
-    return [polygons.corners[a:b] for a, b in zip(polygons.starts[:-1], polygons.starts[1:], strict=True)]
-
-
-def random_point_before(rng, cell, exact):
-    """A projection point: inside the cell, or somewhere else in front of the plane; in sixteenths of a grid step."""
-    middle, spread = cell.mean(axis=0), np.ptp(cell, axis=0)
-    reach = rng.choice([0.4, 0.4, 3.0])
-    point = np.round((middle + rng.uniform(-reach, reach, 3) * spread) * 16) / 16
-    height = -exact.depth(rational([point])[0])
-    return point if height > 0 and height * height > dot(exact.normal, exact.normal) else middle
-
-
-def check_shrunk(seed, scenes, limited, shrink=True):
-    """Points behind shrunk occluders against the exact umbra; returns how many points were in it and how many not."""
-    rng, inside, outside = np.random.default_rng(seed), 0, 0
-    for _ in range(scenes):
-        cell, outline, exact = random_scene(rng)
-        point = random_point_before(rng, cell, exact)
-        v = rational([point])[0]
-        unit = float(dot(exact.normal, exact.normal)) ** 0.5
-        height = float(-exact.depth(v)) / unit
-        depth = height * rng.uniform(0.05, 4) if limited else np.inf
-        umbras = launch_umbra(cell[None], outline_table([outline]), [[0, 0]])
-        corners = polygons_of(launch_shrink(umbras, [0], [point], [depth]))[0] if shrink else outline
-        if shrink:
-            wanted = shrunk(exact, v, Fraction(depth * unit) if limited else None)
-            share = area_of(corners) / area_of(outline) if len(corners) else 0.0
-            assert share == pytest.approx(area_of(wanted) / area_of(outline) if len(wanted) > 2 else 0.0, abs=1e-2)
-        for _ in range(3 if len(corners) else 0):
-            q = rational([rng.dirichlet(np.full(len(corners), 0.3)) @ corners])[0]
-            share = Fraction(rng.uniform(0.02, 0.999))
-            s = share * Fraction(depth / height) if limited else Fraction(float(rng.choice([0.1, 3.0, 500.0]))) * share
-            truth = umbra(exact, along(q, s, minus(q, v)))
-            inside, outside = inside + truth, outside + (not truth)
-    return inside, outside
-
-
-@pytest.mark.parametrize("limited", [False, True])
-def test_what_a_shrunk_occluder_hides_is_in_the_umbra(limited):
-    inside, outside = check_shrunk(5, 150, limited)
-    assert outside == 0 and inside > 100
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("limited", [False, True])
-def test_what_a_shrunk_occluder_hides_is_in_the_umbra_many(limited):
-    inside, outside = check_shrunk(6, 6000, limited)
-    assert outside == 0 and inside > 4000
-
-
-def test_an_unshrunk_occluder_hides_more_than_the_umbra():
-    inside, outside = check_shrunk(7, 60, False, shrink=False)
-    assert outside > inside
-
-
-def check_holes(seed, scenes):
-    """Points seen through holes against grown holes, exact and of the kernel; returns how many."""
-    rng, checked = np.random.default_rng(seed), 0
-    for _ in range(scenes):
-        cell, outline, exact = random_scene(rng)
-        point = random_point_before(rng, cell, exact)
-        v = rational([point])[0]
-        status, polygons = launch_grow_hole(cell[None], outline_table([outline]), [[0, 0]], [point])
-        gap = -max(exact.depth(p) for p in exact.cell)
-        if status[0] != USABLE:
-            assert gap * gap < Fraction(1001, 1000) * dot(exact.normal, exact.normal), "refused though a step away"
-            assert polygons.starts.tolist() == [0, 0]
-            continue
-        hull, kernel = grown_hole(exact, v), [project(exact, q) for q in rational(polygons.corners)]
-        low, high = rational(cell.tolist())
-        for _ in range(4):
-            weights = rational([rng.integers(0, 9, len(outline)).tolist()])[0]
-            if not any(weights):
-                continue
-            w = [dot(weights, column) / sum(weights) for column in zip(*exact.outline, strict=True)]
-            share = rational([(rng.integers(0, 17, 3) / 16).tolist()])[0]
-            eye = [a + k * (b - a) for a, b, k in zip(low, high, share, strict=True)]
-            x = along(w, Fraction(int(rng.integers(0, 4000)), 64), minus(w, eye))
-            crossing = along(v, -exact.depth(v) / (exact.depth(x) - exact.depth(v)), minus(x, v))
-            assert in_hull(hull, exact.normal, crossing)
-            assert in_hull(kernel, exact.normal, crossing)
-            checked += 1
-    return checked
-
-
-def test_what_is_seen_through_a_hole_is_behind_the_grown_hole():
-    assert check_holes(8, 80) > 200
-
-
-@pytest.mark.slow
-def test_what_is_seen_through_a_hole_is_behind_the_grown_hole_many():
-    assert check_holes(9, 4000) > 10_000
-
-
-def test_a_grown_axial_hole_is_the_hull_of_its_corners():
-    cell, hole = np.array([[0, 0, 0], [10, 10, 10]]), [[30, 2, 3], [30, 9, 3], [30, 9, 8], [30, 2, 8]]
-    _, polygons = launch_grow_hole(cell[None], outline_table([hole]), [[0, 0]], [[5.0, 5.0, 5.0]])
-    points = np.array(grown_hole(occluder(cell.tolist(), hole), [Fraction(5)] * 3), float)
-    np.testing.assert_allclose(polygons.corners.min(axis=0), points.min(axis=0), atol=1e-3)
-    np.testing.assert_allclose(polygons.corners.max(axis=0), points.max(axis=0), atol=1e-3)
-
-
-@pytest.mark.parametrize("side", [-1, 1])
-def test_a_hole_seen_from_far_away_hardly_grows(side):
-    hole = np.array([[30, 0, 300], [30, 9000, 1300], [30, 4000, 7800]])
-    low = np.array([30 + side * 90_000, 40, 40])
-    _, polygons = launch_grow_hole([[low, low + 1]], outline_table([hole]), [[0, 0]], [low + 0.5])
-    assert area_of(hole) < area_of(polygons.corners) < 1.001 * area_of(hole)
-
-
-def test_bent_outlines_and_points_behind_leave_nothing():
-    bent = bent_quadrilateral(60)
+def test_bent_outlines_have_no_umbra_from_cells_that_they_cut_or_that_are_round_an_edge():
     cut, before = [[40, 40, 0], [60, 60, 20]], [[0, 0, -99], [9, 9, -90]]
     round_an_edge = [[95, -105, -65], [105, -95, -55]]
-    umbras = launch_umbra([cut, round_an_edge, before], bent, [[0, 0], [1, 0], [2, 0]])
+    umbras = launch_umbra([cut, round_an_edge, before], bent_quadrilateral(60), [[0, 0], [1, 0], [2, 0]])
     assert umbras.status.tolist() == [STRADDLES, BENT, USABLE]
-    status, polygons = launch_grow_hole([before], bent, [[0, 0]], [[4.0, 4.0, -94.0]])
-    assert status.tolist() == [BENT] and polygons.starts.tolist() == [0, 0]
+
+
+def test_what_is_before_the_outline_is_in_no_umbra():
     table = outline_table([[[30, 2, 3], [30, 9, 3], [30, 9, 8]]])
     flat = launch_umbra([[[0, 0, 0], [1, 1, 1]]], table, [[0, 0]])
-    before, behind = launch_shrink(flat, [0, 0], [[0.5, 0.5, 0.5], [31.0, 5, 5]]).starts[1:]
-    assert before == behind > 0
     assert not flat.contains(0, np.array([[29.0, 5, 5]]))[0]
 
 
@@ -343,27 +208,14 @@ def test_threads_and_order_change_nothing():
     scenes = [random_scene(rng)[:2] for _ in range(40)]
     boxes, table = np.array([cell for cell, _ in scenes]), outline_table([outline for _, outline in scenes])
     pairs = np.stack(np.meshgrid(np.arange(40), np.arange(40)), axis=-1).reshape(-1, 2)
-    points = boxes[pairs[:, 0]].mean(axis=1)
-    results = []
-    for threads in (1, 2):
-        umbras = launch_umbra(boxes, table, pairs, threads=threads)
-        shrunken = launch_shrink(umbras, np.arange(len(pairs)), points, threads=threads)
-        holes = launch_grow_hole(boxes, table, pairs, points, threads=threads)[1]
-        results.append([umbras.status, umbras.planes, umbras.rho, shrunken.corners, holes.corners, holes.starts])
-    for one, two in zip(*results, strict=True):
-        np.testing.assert_array_equal(one, two)
+    one, two = (launch_umbra(boxes, table, pairs, device=Device(threads=threads)) for threads in (1, 2))
+    for name in ("status", "planes", "rho"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
     last = launch_umbra(boxes, table, pairs[-1:])
-    np.testing.assert_array_equal(last.planes, umbras.planes[umbras.starts[-2] :])
+    np.testing.assert_array_equal(last.planes, one.planes[one.starts[-2] :])
 
 
 @pytest.mark.parametrize("box", [[[0, 0, 0], [1, 0, 1]], [[0, 0, 0], [1, 1, 2**24]]])
 def test_bad_cells(box):
     with pytest.raises(InputError, match="view cell 0: expected a box with inside"):
         launch_umbra([box], outline_table([[[30, 2, 3], [30, 9, 3], [30, 9, 8]]]), [[0, 0]])
-
-
-def test_bad_case_files(tmp_path):
-    path = tmp_path / "cases.txt"
-    path.write_text("# fine\nname; hidden; 0 0 0, 1 1 1; 2 0 0, 2 1 0; 3 0 0, 4 1 1; -; too few corners\n")
-    with pytest.raises(InputError, match=r"cases.txt, line 2: expected 'name; expected"):
-        load_shadow_cases(path)

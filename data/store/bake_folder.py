@@ -6,7 +6,6 @@ A witness is the sightline from `origin_*` to `origin_* + direction_*`.
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import pyarrow.parquet as pq
 
 from ..errors import InputError
 from ..graph import OTHER_AXES, CellGraph
+from ..rows import Rows
 from ..scene import Scene
 from ..verdict import Verdict
 from .graph_folder import CELL_COLUMNS, PORTAL_COLUMNS, read_graph
@@ -28,39 +28,7 @@ CELL_TO_OBJECT = ("cell_id", "object_id", "verdict", *WITNESS)
 CELL_LODS = ("cell_id", "object_id", "lod")
 
 
-@dataclass
-class VisibleRows:
-    """Rows of cell_to_cell or cell_to_object, ordered by source, then target.
-
-    Attributes:
-        source: inhabitable cell, shape (n,), int32.
-        target: reached cell or object, shape (n,), int32.
-        seen: whether there is a witness, shape (n,), bool.
-        origin: [grid steps], shape (n, 3), float64; undefined where not seen.
-        end: likewise.
-        portal_starts: shape (n + 1,), int64, or None for objects.
-        portals: crossed portals of row r are portals[portal_starts[r]:portal_starts[r + 1]], int32.
-    """
-
-    source: np.ndarray
-    target: np.ndarray
-    seen: np.ndarray
-    origin: np.ndarray
-    end: np.ndarray
-    portal_starts: np.ndarray | None = None
-    portals: np.ndarray | None = None
-
-
-NO_CELL_ROWS = VisibleRows(
-    *(np.zeros(0, np.int32) for _ in range(2)),
-    np.zeros(0, bool),
-    *(np.zeros((0, 3)) for _ in range(2)),
-    np.zeros(1, np.int64),
-    np.zeros(0, np.int32),
-)
-
-
-class Bake:
+class BakeFolder:
     """A finished bake: the model, its cells and portals, and what is visible from where.
 
     Attributes:
@@ -98,7 +66,8 @@ class Bake:
     def cell_to_cell(self) -> pa.Table:
         """Reached cells: verdict, portal sequence and witness [m]; no rows in a bake that claims nothing of cells."""
         if not self.claims_cells:
-            return _cell_to_cell_table(NO_CELL_ROWS, self.grid_m)
+            none = Rows.unseen(np.zeros(0), np.zeros(0)).with_portals(np.zeros(0, int), np.zeros(0, np.int32))
+            return _cell_to_cell_table(none, self.grid_m)
         return read_table(self.folder / "cell_to_cell.parquet", CELL_TO_CELL)
 
     @cached_property
@@ -154,7 +123,7 @@ class Bake:
         table = self.cell_to_object
         rows = table["cell_id"].to_numpy() == cell
         if verdict is not None:
-            rows &= np.array(table["verdict"].to_pylist(), object) == verdict.value
+            rows &= np.array(table["verdict"].to_pylist(), object) == verdict.word
         return np.sort(table["object_id"].to_numpy()[rows])
 
     def _matrix(self, table: pa.Table, target: str, targets: int) -> np.ndarray:
@@ -163,7 +132,7 @@ class Bake:
         return out
 
 
-def load(folder: str | Path) -> Bake:
+def read_bake(folder: str | Path) -> BakeFolder:
     """Open a bake folder.
 
     Raises:
@@ -174,12 +143,12 @@ def load(folder: str | Path) -> Bake:
     missing = [name for name in ("grid_m", "origin", "counts", "settings") if name not in manifest]
     if missing:
         raise InputError(f"{folder / 'manifest.json'}: expected the key {missing[0]!r}, found none")
-    bake = Bake(folder, manifest)
+    bake = BakeFolder(folder, manifest)
     _check_ids(bake)
     return bake
 
 
-def _check_ids(bake: Bake) -> None:
+def _check_ids(bake: BakeFolder) -> None:
     """Every id in the visibility tables names a row of its own table; every source is inhabitable."""
     limits = {"cell_id": bake.graph.cell_count, "reached_cell_id": bake.graph.cell_count}
     limits["object_id"] = int(bake.manifest["counts"]["objects"])
@@ -205,19 +174,28 @@ def write_bake(
     manifest: Callable[[], dict],
     scene: Scene | None,
     graph: CellGraph,
-    cell_rows: VisibleRows | None,
-    object_rows: VisibleRows,
+    rows: tuple[Rows | None, Rows],
     grid_m: float,
     more: dict[str, pa.Table] | None = None,
-) -> Bake:
+) -> dict:
     """Write a bake folder atomically: a temporary folder beside the target, then a rename.
 
-    The manifest is asked for when the tables are written, so that it can tell how long that took. `more` are tables
-    beyond the format's own, by name.
+    Args:
+        folder: to write.
+        manifest: asked for when the tables are written, so that it can tell how long that took.
+        scene: the model; None for a bare graph.
+        graph: its cells and portals.
+        rows: what is seen: cells with their portals, or None where nothing is claimed of them, and objects.
+        grid_m: grid step [m].
+        more: tables beyond the format's own, by name.
+
+    Returns:
+        The manifest.
 
     Raises:
         InputError: the disk is full or the place is not writable; what was there before is untouched.
     """
+    cell_rows, object_rows = rows
     empty = Scene([], [])
     tables = {
         "meshes": meshes_table(scene or empty),
@@ -235,7 +213,7 @@ def write_bake(
             pq.write_table(table, temporary / f"{name}.parquet", compression="zstd")
         final = manifest()
         (temporary / "manifest.json").write_text(json.dumps(final, indent=1) + "\n", encoding="utf-8")
-    return Bake(folder, final)
+    return final
 
 
 def cells_table(graph: CellGraph, grid_m: float) -> pa.Table:
@@ -264,27 +242,23 @@ def portals_table(graph: CellGraph, grid_m: float) -> pa.Table:
     return pa.table(columns | {name: pa.array(x) for name, x in zip(PORTAL_COLUMNS[4:], values, strict=True)})
 
 
-def _witness_columns(rows: VisibleRows, grid_m: float) -> dict[str, pa.Array]:
+def _witness_columns(rows: Rows, grid_m: float) -> dict[str, pa.Array]:
     # The grid step is a power of two, so metres hold the same points, and both ends are multiples of a 1024th of it.
     values = np.concatenate([rows.origin * grid_m, rows.end * grid_m - rows.origin * grid_m], axis=1)
     return {name: pa.array(values[:, i], mask=~rows.seen) for i, name in enumerate(WITNESS)}
 
 
-def _verdicts(rows: VisibleRows) -> pa.Array:
-    return pa.array(np.where(rows.seen, Verdict.VISIBLE.value, Verdict.UNKNOWN.value).astype(object), pa.string())
+def _pair_columns(rows: Rows, target: str) -> dict[str, pa.Array]:
+    words = np.array([verdict.word for verdict in Verdict], object)[rows.verdict]
+    source, reached = (pa.array(column.astype(np.int32)) for column in (rows.source, rows.target))
+    return {"cell_id": source, target: reached, "verdict": pa.array(words, pa.string())}
 
 
-def _cell_to_cell_table(rows: VisibleRows, grid_m: float) -> pa.Table:
-    starts = rows.portal_starts.astype(np.int32)
-    columns = {
-        "cell_id": pa.array(rows.source),
-        "reached_cell_id": pa.array(rows.target),
-        "verdict": _verdicts(rows),
-        "portals": pa.ListArray.from_arrays(pa.array(starts), pa.array(rows.portals.astype(np.int32))),
-    }
-    return pa.table(columns | _witness_columns(rows, grid_m))
+def _cell_to_cell_table(rows: Rows, grid_m: float) -> pa.Table:
+    starts, portals = rows.portal_starts.astype(np.int32), rows.portals.astype(np.int32)
+    columns = {"portals": pa.ListArray.from_arrays(pa.array(starts), pa.array(portals))}
+    return pa.table(_pair_columns(rows, "reached_cell_id") | columns | _witness_columns(rows, grid_m))
 
 
-def _cell_to_object_table(rows: VisibleRows, grid_m: float) -> pa.Table:
-    columns = {"cell_id": pa.array(rows.source), "object_id": pa.array(rows.target), "verdict": _verdicts(rows)}
-    return pa.table(columns | _witness_columns(rows, grid_m))
+def _cell_to_object_table(rows: Rows, grid_m: float) -> pa.Table:
+    return pa.table(_pair_columns(rows, "object_id") | _witness_columns(rows, grid_m))

@@ -8,7 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 from builders import small_house
 from viewcell.data.errors import InputError
-from viewcell.data.store.database import Bake, VisibleRows, load, write_bake
+from viewcell.data.rows import Rows
+from viewcell.data.store.bake_folder import BakeFolder, read_bake, write_bake
 
 GRID_M = 2.0**-10
 WITNESS = ["origin_x", "origin_y", "origin_z", "direction_x", "direction_y", "direction_z"]
@@ -27,13 +28,11 @@ COLUMNS = {
 
 def rows_of(targets, portals):
     """Rows of cell 0 and cell 2: seen, unknown, seen."""
-    source, target = np.array([0, 0, 2], np.int32), np.array(targets, np.int32)
+    rows = Rows.unseen(np.array([0, 0, 2]), np.array(targets))
     origin = np.array([[1.5, 2.25, 1023.0], [0, 0, 0], [-7.125, 2.0, 3.0]])
     end = origin + np.array([[0.5, -3.0, 2**-10], [0, 0, 0], [100.0, 4.0, 5.0]])
-    seen = np.array([True, False, True])
-    if not portals:
-        return VisibleRows(source, target, seen, origin, end)
-    return VisibleRows(source, target, seen, origin, end, np.array([0, 2, 2, 3]), np.array([0, 1, 4], np.int32))
+    rows.show(np.array([0, 2]), origin[[0, 2]], end[[0, 2]])
+    return rows.with_portals(np.array([2, 0, 1]), np.array([0, 1, 4])) if portals else rows
 
 
 def made(folder):
@@ -43,7 +42,8 @@ def made(folder):
     manifest |= {"unit": "metre", "source": "small house", "sha256": "", "skipped": []}
     manifest |= {"settings": {}, "counts": counts, "seconds": {}, "complete": True}
     rows = rows_of([0, 2, 4], True), rows_of([3, 1, 17], False)
-    return write_bake(folder, lambda: manifest, scene, graph, *rows, GRID_M), scene, graph
+    write_bake(folder, lambda: manifest, scene, graph, rows, GRID_M)
+    return read_bake(folder), scene, graph
 
 
 def test_columns_are_those_of_format_1(tmp_path):
@@ -58,7 +58,7 @@ def test_columns_are_those_of_format_1(tmp_path):
 
 def test_what_was_written_is_read(tmp_path):
     _, scene, graph = made(tmp_path / "house")
-    bake = load(tmp_path / "house")
+    bake = read_bake(tmp_path / "house")
     for name in ("cells", "inhabitable", "portal_cells", "portal_axis", "portals"):
         np.testing.assert_array_equal(getattr(bake.graph, name), getattr(graph, name), err_msg=name)
     assert bake.graph.cell_names.tolist() == graph.cell_names.tolist()
@@ -79,7 +79,7 @@ def test_what_was_written_is_read(tmp_path):
 
 def test_potential_and_seen(tmp_path):
     bake = made(tmp_path / "house")[0]
-    assert isinstance(bake, Bake)
+    assert isinstance(bake, BakeFolder)
     assert bake.potential(0).tolist() == [1, 3] and bake.seen(0).tolist() == [3]
     assert bake.potential(4).tolist() == [] and bake.potential(2).tolist() == [17]
     assert np.argwhere(bake.potential_cells).tolist() == [[0, 0], [0, 2], [2, 4]]
@@ -125,7 +125,7 @@ def test_contradictions_are_one_line(spoil, message, tmp_path):
     made(tmp_path / "house")
     spoil(tmp_path / "house")
     with pytest.raises(InputError) as told:
-        load(tmp_path / "house")
+        read_bake(tmp_path / "house")
     assert message in str(told.value) and "\n" not in str(told.value)
 
 
@@ -134,7 +134,7 @@ def test_a_source_that_is_not_inhabitable_is_refused(tmp_path):
     made(tmp_path / "house")
     change_ids(tmp_path / "house", "cell_to_cell", "cell_id", 1)
     with pytest.raises(InputError, match="inhabitable"):
-        load(tmp_path / "house")
+        read_bake(tmp_path / "house")
 
 
 def test_a_failed_write_leaves_the_old_bake(tmp_path, monkeypatch):

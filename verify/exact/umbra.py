@@ -1,4 +1,4 @@
-"""Umbras, shrunk occluders and grown holes in rationals, written from the mathematics and not from the kernel.
+"""Umbras in rationals, written from the mathematics and not from the kernel. Twin of `kernels/umbra.py`.
 
 Outlines are planar, convex and run either way round; cells are boxes with inside; all coordinates are rational. n is
 the outline's normal, turned away from the cell, h(x) = n . x - d the scaled depth beyond its plane (negative in the
@@ -13,42 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import combinations, product
-from pathlib import Path
+from itertools import combinations
 
-from ...data.errors import InputError
-
-Vector = Sequence[Fraction]
-
-
-def minus(a: Vector, b: Vector) -> list[Fraction]:
-    """Difference a - b."""
-    return [x - y for x, y in zip(a, b, strict=True)]
-
-
-def along(a: Vector, s: Fraction, b: Vector) -> list[Fraction]:
-    """The point a + s b."""
-    return [x + s * y for x, y in zip(a, b, strict=True)]
-
-
-def cross(a: Vector, b: Vector) -> list[Fraction]:
-    """Cross product."""
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def dot(a: Vector, b: Vector) -> Fraction:
-    """Scalar product."""
-    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
-
-
-def rational(points: Sequence[Sequence[float]]) -> list[list[Fraction]]:
-    """Points of exact fractions; floats are taken at their exact value."""
-    return [[Fraction(c) for c in point] for point in points]
-
-
-def box_corners(box: Sequence[Vector]) -> list[list[Fraction]]:
-    """The eight corners of (low, high)."""
-    return [[Fraction(box[side][i]) for i, side in enumerate(pick)] for pick in product((0, 1), repeat=3)]
+from ..arithmetic import Vector, along, box_corners, cross, dot, minus, rational
 
 
 @dataclass(frozen=True)
@@ -162,71 +129,6 @@ def winds(cell: Sequence[Vector], outline: Sequence[Vector], x: Vector) -> bool:
     return min(sides) >= 0 or max(sides) <= 0
 
 
-def clip(polygon: list[list[Fraction]], m: Vector, c: Fraction) -> list[list[Fraction]]:
-    """The part of a convex polygon with m . q >= c."""
-    out = []
-    for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
-        here, there = dot(m, a) - c, dot(m, b) - c
-        if here >= 0:
-            out.append(a)
-        if here * there < 0:
-            out.append(along(a, here / (here - there), minus(b, a)))
-    return out
-
-
-def shrunk(o: Occluder, v: Vector, depth: Fraction | None = None) -> list[list[Fraction]]:
-    """The part of the outline for which all that lies behind it, seen from v, is in the umbra.
-
-    Args:
-        o: cell and outline.
-        v: in front of the plane.
-        depth: limit on h(x), in the scale of `normal`; None for none.
-    """
-    height = -o.depth(v)
-    if o.planes is None or height <= 0:
-        return []
-    polygon = o.outline
-    for m, c in o.planes:
-        bound = dot(m, v) if depth is None else (c + depth / height * dot(m, v)) / (1 + depth / height)
-        polygon = clip(polygon, m, max(c, bound)) if polygon else []
-    return polygon
-
-
-def grown_hole(o: Occluder, v: Vector) -> list[list[Fraction]]:
-    """Points whose convex hull, in the outline's plane, holds all that is seen through the outline, as seen from v.
-
-    Raises:
-        ValueError: the cell or v are not in front of the plane.
-    """
-    height = -o.depth(v)
-    if o.straddles or height <= 0 or any(o.depth(p) >= 0 for p in o.cell):
-        raise ValueError("expected cell and point in front of the hole's plane")
-    return o.outline + [along(v, height / -o.depth(p), minus(w, p)) for p in o.cell for w in o.outline]
-
-
-def in_hull(points: list[list[Fraction]], normal: Vector, q: Vector) -> bool:
-    """Whether q lies in the convex hull of points of its plane."""
-    drop = max(range(3), key=lambda i: abs(normal[i]))
-    i, j = (drop + 1) % 3, (drop + 2) % 3
-    flat = sorted((p[i], p[j]) for p in points)
-
-    def chain(ordered: list[tuple[Fraction, Fraction]]) -> list[tuple[Fraction, Fraction]]:
-        hull: list[tuple[Fraction, Fraction]] = []
-        for p in ordered:
-            while len(hull) > 1 and _turn(hull[-2], hull[-1], p) <= 0:
-                hull.pop()
-            hull.append(p)
-        return hull[:-1]
-
-    hull = chain(flat) + chain(flat[::-1])
-    at = (q[i], q[j])
-    return all(_turn(a, b, at) >= 0 for a, b in zip(hull, hull[1:] + hull[:1], strict=True))
-
-
-def _turn(a: Sequence[Fraction], b: Sequence[Fraction], c: Sequence[Fraction]) -> Fraction:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
 def lowest_height(o: Occluder) -> Fraction | None:
     """Least h(x) within the supporting half-spaces, by trying all triples of planes; None if there is no least.
 
@@ -245,54 +147,3 @@ def lowest_height(o: Occluder) -> Fraction | None:
         if all(dot(m, point) >= c for m, c in planes) and (least is None or o.depth(point) < least):
             least = o.depth(point)
     return least if bounded else None
-
-
-@dataclass(frozen=True)
-class ShadowCase:
-    """One hard umbra question.
-
-    Attributes:
-        name: unique.
-        expected: "hidden" (the box is in the umbra), "touch" (it is, and touches its border) or "not".
-        cell: (low, high) [grid steps].
-        outline: corners [grid steps].
-        box: (low, high) [grid steps].
-        rho: of two opposite edges, the first and the third, rounded to 4 digits; None where the cell straddles.
-        origin: where the case came from.
-    """
-
-    name: str
-    expected: str
-    cell: list[list[int]]
-    outline: list[list[int]]
-    box: list[list[int]]
-    rho: tuple[float, float] | None
-    origin: str
-
-
-def load_shadow_cases(path: str | Path) -> list[ShadowCase]:
-    """Cases of a text file: `name; expected; cell; outline; box; rho; origin` a line, # starts a comment.
-
-    A point is `x y z`; points are separated by commas; rho is two numbers or `-`.
-
-    Raises:
-        InputError: a line has another form.
-    """
-    cases = []
-    for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
-        line = line.partition("#")[0].strip()
-        if not line:
-            continue
-        try:
-            name, expected, *points, rho, origin = (part.strip() for part in line.split(";"))
-            cell, outline, box = ([[int(c) for c in point.split()] for point in part.split(",")] for part in points)
-            pair = None if rho == "-" else tuple(float(r) for r in rho.split())
-            if expected not in ("hidden", "touch", "not") or {len(p) for p in cell + outline + box} != {3}:
-                raise ValueError
-            if len(cell) != 2 or len(box) != 2 or len(outline) < 3 or (pair is not None and len(pair) != 2):
-                raise ValueError
-        except ValueError:
-            form = "name; expected; cell; outline; box; rho; origin"
-            raise InputError(f"{path}, line {number}: expected '{form}', found {line!r}") from None
-        cases.append(ShadowCase(name, expected, cell, outline, box, pair, origin))
-    return cases

@@ -1,0 +1,111 @@
+"""A model prepared for visibility: everything that hides in it and everything that may be hidden, each found once.
+
+Occluders are, from the plainest to the most general: opaque rectangles of axial planes, which also cut cells; regions,
+which merge them with sections of closed elements; patches, which are oblique. Glass is none of them. Every part is made
+when it is first asked for; a scene does not change once it is read.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from .blockers import Blockers, find_blockers
+from .graph import CellGraph
+from .occludees import Occludees, find_occludees
+from .opaque import NO_PLANES, OpaquePlanes, opaque_planes
+from .patches import Patches, find_patches, join_outlines, rectangle_outlines
+from .regions import Regions, find_regions
+from .scene import OPAQUE, Role, Scene
+from .solids import closed_elements
+
+# Smaller pieces of furniture hide little and would fill the hierarchy of blockers.
+BLOCKING_DETAIL_M2 = 0.1
+# Oblique surfaces below this hide little, and are not made of triangles below the share.
+PATCH_M2 = 1.0
+PATCH_SHARE = 1 / 32
+
+
+class PreparedModel:
+    """What hides and what may be hidden in a scene, in grid steps.
+
+    Attributes:
+        scene: the model.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        """Nothing is computed yet."""
+        self.scene = scene
+
+    @cached_property
+    def closed(self) -> list[tuple[int, np.ndarray]]:
+        """(object_id, triangles (m, 3, 3) int32) of each closed opaque element."""
+        return closed_elements(self.scene)
+
+    def closed_of(self, role: Role) -> list[tuple[int, np.ndarray]]:
+        """Those of one role."""
+        wanted = self.scene.object_mask(role)
+        return [(object_id, triangles) for object_id, triangles in self.closed if wanted[object_id]]
+
+    @cached_property
+    def planes(self) -> OpaquePlanes:
+        """Opaque rectangles of occluders: what cuts cells."""
+        return opaque_planes(self.scene.triangles(Role.OCCLUDER)[0])
+
+    @cached_property
+    def blocking_planes(self) -> OpaquePlanes:
+        """The same and the large ones of details (furniture): what blocks."""
+        triangles, _ = self.scene.triangles(Role.DETAIL)
+        least = BLOCKING_DETAIL_M2 / self.scene.grid_m**2
+        boxes = []
+        # Half of a large rectangle is a large triangle; the fans that close round tops are not worth looking at.
+        large = opaque_planes(triangles[_flat_area(np.ptp(triangles, axis=1)) >= least], oblique_steps=1)
+        for axis, (mine, others) in enumerate(zip(large.boxes, self.planes.boxes, strict=True)):
+            both = np.concatenate([others, mine[_flat_area(mine[:, 1] - mine[:, 0]) >= least]])
+            boxes.append(both[np.argsort(both[:, 0, axis], kind="stable")])
+        return OpaquePlanes(boxes, self.planes.axial_area, self.planes.lost_area)
+
+    @cached_property
+    def regions(self) -> Regions:
+        """Opaque regions of axial planes, sections of closed elements among them."""
+        solids = ([triangles for _, triangles in self.closed_of(role)] for role in OPAQUE)
+        return find_regions(self.blocking_planes, *solids, self.scene.grid_m)
+
+    @cached_property
+    def patches(self) -> Patches:
+        """Oblique occluders: discs of opaque triangles."""
+        corners, owners = self.scene.triangles(*OPAQUE)
+        least = PATCH_M2 / self.scene.grid_m**2
+        # The extent bounds the area, and most triangles of a large model are small ones of furniture and pipes.
+        large = np.flatnonzero(_flat_area(np.ptp(corners, axis=1)) >= PATCH_SHARE * least)
+        edges = (corners[large, 1:] - corners[large, :1]).astype(float)
+        large = large[np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) >= 2 * PATCH_SHARE * least]
+        return find_patches(corners[large], owners[large], least_area=least)
+
+    @cached_property
+    def outlines(self) -> Patches:
+        """Rectangles of regions and oblique patches alike, as convex outlines."""
+        return join_outlines(rectangle_outlines(self.regions.boxes), self.patches)
+
+    @cached_property
+    def occludees(self) -> Occludees:
+        """Objects and their pieces: what may be hidden."""
+        return find_occludees(self.scene)
+
+    def blockers(self, graph: CellGraph) -> Blockers:
+        """What no sightline between live cells of a cell-and-portal graph of the model crosses."""
+        return find_blockers(graph, self.blocking_planes)
+
+
+def no_regions() -> Regions:
+    """Regions of nothing."""
+    return find_regions(NO_PLANES, [], [], 1.0)
+
+
+def no_patches() -> Patches:
+    """Patches of nothing."""
+    return find_patches(np.zeros((0, 3, 3), np.int32), np.zeros(0, int), least_area=1.0)
+
+
+def _flat_area(extent: np.ndarray) -> np.ndarray:
+    """Area of the two longest sides of boxes with this extent, shape (n, 3), float64."""
+    return np.sort(extent.astype(float), axis=1)[:, 1:].prod(axis=1)

@@ -1,0 +1,81 @@
+"""The one table of visibility: what each view cell may see, from the search to the bake folder."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .ragged import starts_of, take_lists
+from .verdict import Verdict
+
+
+@dataclass
+class Rows:
+    """Pairs of a view cell and a cell or object that is not proved hidden from it; a pair that is absent is hidden.
+
+    Attributes:
+        source: view cell, shape (n,), int64.
+        target: reached cell, or object, shape (n,), int64.
+        verdict: VISIBLE where there is a witness, else UNKNOWN, shape (n,), uint8.
+        origin: of the witness, in the view cell [grid steps], shape (n, 3), float64; undefined where unknown.
+        end: of the witness, on the target, likewise.
+        portal_starts: portals that the witness of row r crosses are portals[portal_starts[r]:portal_starts[r + 1]],
+            shape (n + 1,), int64; None where they are not listed.
+        portals: int32, or None.
+    """
+
+    source: np.ndarray
+    target: np.ndarray
+    verdict: np.ndarray
+    origin: np.ndarray
+    end: np.ndarray
+    portal_starts: np.ndarray | None = None
+    portals: np.ndarray | None = None
+
+    @classmethod
+    def unseen(cls, source: np.ndarray, target: np.ndarray) -> "Rows":
+        """Pairs without a witness."""
+        count = len(source)
+        unknown = np.full(count, Verdict.UNKNOWN, np.uint8)
+        return cls(np.asarray(source, np.int64), np.asarray(target, np.int64), unknown, *np.zeros((2, count, 3)))
+
+    @classmethod
+    def join(cls, parts: "list[Rows]") -> "Rows":
+        """All of some rows, in order, without their portals."""
+        parts = [cls.unseen(np.zeros(0), np.zeros(0)), *parts]
+        names = ("source", "target", "verdict", "origin", "end")
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Rows that have a witness, shape (n,), bool."""
+        return self.verdict == Verdict.VISIBLE
+
+    def show(self, chosen: np.ndarray, origin: np.ndarray, end: np.ndarray) -> None:
+        """Give the chosen rows these witnesses, in place."""
+        self.verdict[chosen] = Verdict.VISIBLE
+        self.origin[chosen], self.end[chosen] = origin, end
+
+    def take(self, chosen: np.ndarray) -> "Rows":
+        """Some rows (indices or bool), with their portals."""
+        columns = (self.source, self.target, self.verdict, self.origin, self.end)
+        out = Rows(*(column[chosen] for column in columns))
+        if self.portal_starts is not None:
+            out.portal_starts, places = take_lists(self.portal_starts, chosen)
+            out.portals = self.portals[places]
+        return out
+
+    def order(self) -> "Rows":
+        """Ordered by source, then target."""
+        return self.take(np.lexsort((self.target, self.source)))
+
+    def with_portals(self, counts: np.ndarray, portals: np.ndarray) -> "Rows":
+        """The same rows, each with so many of the portals."""
+        return replace(self, portal_starts=starts_of(counts), portals=portals)
+
+    def relabelled(self, places: np.ndarray) -> "Rows":
+        """The rows with source c called places[c], and without those of sources whose place is -1."""
+        kept = self.take(places[self.source] >= 0)
+        return replace(kept, source=places[kept.source])

@@ -1,0 +1,131 @@
+"""View cells in a table: Parquet or CSV with min_x ... max_z, read, snapped to the grid, and written."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+
+from ..errors import InputError
+from ..graph import CellGraph
+from ..scene import GRID_LIMIT, Scene
+from ..view_cells import as_graph
+from .graph_folder import CELL_COLUMNS, inhabitable_column, numbers, optional_column
+from .scene_folder import one_line, read_table
+
+# View cells may stand this far outside the model's box: in the street before a house.
+AROUND_M = 10.0
+
+
+@dataclass(frozen=True)
+class ViewCells:
+    """View cells and what their table calls them.
+
+    Attributes:
+        graph: a graph without portals.
+        ids: of each cell, shape (cells,), int64 or str.
+    """
+
+    graph: CellGraph
+    ids: np.ndarray
+
+
+def write_view_cells(boxes: np.ndarray, scene: Scene, path: str | Path) -> None:
+    """Boxes [grid steps], shape (n, 2, 3), as a table in the model's own metres, which `read_view_cells` gives back."""
+    rows = boxes.reshape(-1, 6) * scene.grid_m + np.tile(scene.origin, 2)
+    lines = [",".join(f"{value:.10f}" for value in row) for row in rows]
+    Path(path).write_text("\n".join(["min_x,min_y,min_z,max_x,max_y,max_z", *lines]) + "\n", encoding="utf-8")
+
+
+def read_view_cells(path: str | Path, scene: Scene) -> CellGraph:
+    """View cells of a table, Parquet or CSV: min_x ... max_z, and if they are there cell_id, inhabitable and name.
+
+    Args:
+        path: metres in the model's own place (Z up, before recentring).
+        scene: the model.
+
+    Returns:
+        A graph without portals. Boxes are snapped outwards, so that every eye in the given box is in the cell.
+
+    Raises:
+        InputError: the table is unreadable, a box has no volume, or one lies more than AROUND_M outside the model.
+    """
+    view = view_cells(read_rows(path), scene, str(path))
+    if view.ids.dtype != np.int64:
+        raise InputError(f"{path}: expected numbers as cell_id, found {view.ids[0]!r}")
+    order = np.argsort(view.ids)
+    if not np.array_equal(view.ids[order], np.arange(len(order))):
+        ends = f"{view.ids.min()} to {view.ids.max()}"
+        raise InputError(f"{path}: expected cell_id 0 to {len(order) - 1}, each once, found {ends}")
+    graph = view.graph
+    return as_graph(graph.cells[order], graph.cell_names[order], graph.inhabitable[order])
+
+
+def view_cells(
+    table: pa.Table, scene: Scene, where: str, *, origin: np.ndarray | None = None, inwards: bool = False
+) -> ViewCells:
+    """View cells of a table, in its order, with ids of any kind; columns and errors as of `read_view_cells`.
+
+    Args:
+        table: min_x ... max_z [m].
+        scene: the model.
+        where: what to call the table in errors.
+        origin: of the table's coordinates in the model's own place [m]; 0 by default.
+        inwards: snap so that every eye in the cell is in the given box, instead of the other way round.
+    """
+    missing = [name for name in CELL_COLUMNS[1:] if name not in table.column_names]
+    if missing:
+        raise InputError(f"{where}: expected the column {missing[0]!r}, found {', '.join(table.column_names)}")
+    if not table.num_rows:
+        raise InputError(f"{where}: expected at least one view cell, found an empty table")
+    boxes = numbers(table, CELL_COLUMNS[1:], Path(where)).reshape(-1, 2, 3)
+    shift = scene.origin if origin is None else scene.origin - origin
+    steps = (boxes - shift) / scene.grid_m
+    if np.abs(steps).max() > GRID_LIMIT:
+        raise InputError(
+            f"{where}: expected view cells near the model, found a coordinate of {np.abs(boxes).max():g} m"
+        )
+    down, up = (np.ceil, np.floor) if inwards else (np.floor, np.ceil)
+    cells = np.stack([down(steps[:, 0]), up(steps[:, 1])], axis=1).astype(np.int64)
+    ids = _cell_ids(table, where)
+    flat = np.flatnonzero(((boxes[:, 1] <= boxes[:, 0]) | (cells[:, 1] <= cells[:, 0])).any(axis=1))
+    if len(flat):
+        raise InputError(f"{where}: expected view cells with min below max, found cell {ids[flat[0]]} without volume")
+    low, high = scene.bounds() + np.array([[-1], [1]]) * round(AROUND_M / scene.grid_m)
+    away = np.flatnonzero((cells[:, 0] >= high).any(axis=1) | (cells[:, 1] <= low).any(axis=1))
+    if len(away):
+        raise InputError(
+            f"{where}: expected view cells within {AROUND_M:g} m of the model, found cell {ids[away[0]]} outside"
+        )
+    return ViewCells(as_graph(cells, optional_column(table, "name", ""), inhabitable_column(table, where)), ids)
+
+
+def _cell_ids(table: pa.Table, where: str) -> np.ndarray:
+    """Ids of a table's rows, each once: the column cell_id, or places."""
+    if "cell_id" not in table.column_names:
+        return np.arange(table.num_rows)
+    column = table["cell_id"]
+    if pa.types.is_string(column.type) and not column.null_count:
+        ids = np.array(column.to_pylist(), object)
+    else:
+        ids = numbers(table, ("cell_id",), Path(where))[:, 0].astype(np.int64)
+    values, times = np.unique(ids, return_counts=True)
+    if (times > 1).any():
+        raise InputError(f"{where}: expected each cell_id once, found {values[times > 1][0]} {times.max()} times")
+    return ids
+
+
+def read_rows(path: str | Path) -> pa.Table:
+    """A table, Parquet or, by the name's ending, CSV.
+
+    Raises:
+        InputError: it is missing or unreadable.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".csv":
+        return read_table(path, ())
+    try:
+        return pyarrow.csv.read_csv(path)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(f"{path}: expected a CSV table, found {one_line(error)}") from None

@@ -1,0 +1,126 @@
+"""Sightlines shot from view cells: a model's triangles and solids on a device, ready to be aimed at."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...data.prepared import PreparedModel
+from ...data.rows import Rows
+from ...data.scene import OPAQUE
+from ...data.solids import SolidIndex
+from ...kernels.launch import Device
+from ...kernels.sightline import AimTargets, Triangles, aim_targets, device_triangles, launch_aim, launch_confirm
+
+# Sightlines aimed at each object before anything is proved: most visible objects fall to the first few; then at each
+# that is left, round by round.
+FIRST_TRIES = 12
+AIM_ROUNDS = (32, 128, 512)
+
+
+@dataclass
+class Sights:
+    """What sightlines from some view cells meet.
+
+    Attributes:
+        model: the model.
+        cells: view cells [grid steps], shape (cells, 2, 3), int32; they may overlap each other and solids.
+        triangles: opaque ones.
+        targets: triangles of all objects.
+        ranges: first and past-the-last triangle of each object among the targets, shape (objects, 2).
+        solids: closed elements by view cell.
+        seed: of the random sightlines.
+        device: that holds triangles and targets.
+    """
+
+    model: PreparedModel
+    cells: np.ndarray
+    triangles: Triangles
+    targets: AimTargets
+    ranges: np.ndarray
+    solids: SolidIndex
+    seed: int
+    device: Device
+
+    @classmethod
+    def of(cls, model: PreparedModel, cells: np.ndarray, seed: int, device: Device) -> "Sights":
+        """Copy a model's triangles to the device."""
+        scene, starts = model.scene, model.scene.triangle_starts
+        triangles = device_triangles(*scene.triangles(*OPAQUE), device)
+        ranges, solids = np.column_stack([starts[:-1], starts[1:]]), SolidIndex(cells, model.closed)
+        targets = aim_targets(scene.triangles()[0], device)
+        return cls(model, cells, triangles, targets, ranges, solids, seed, device)
+
+    def from_cells(self, cells: np.ndarray) -> "Sights":
+        """The same from other view cells."""
+        return replace(self, cells=cells, solids=SolidIndex(cells, self.model.closed))
+
+    def outside(self, source: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Points in their view cells that certainly lie outside every solid, shape (n,), bool."""
+        free = np.zeros(len(source), bool)
+        for cell in np.unique(source):
+            rows = np.flatnonzero(source == cell)
+            free[rows] = self.solids.outside(points[rows], int(cell))
+        return free
+
+    def clear(self, source: np.ndarray, origin: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Segments that start outside every solid and certainly clear every opaque triangle, shape (n,), bool."""
+        ok = launch_confirm(self.triangles, origin, end, np.full(len(origin), -1), device=self.device)
+        rows = np.flatnonzero(ok)
+        ok[rows] = self.outside(source[rows], origin[rows])
+        return ok
+
+    def aim(
+        self,
+        rows: Rows,
+        pairs: np.ndarray,
+        boxes: np.ndarray,
+        hints: np.ndarray,
+        streams: np.ndarray,
+        tries: int,
+        number: int,
+    ) -> None:
+        """Shoot at the objects of pairs; shows those that are hit, in place.
+
+        A witness ends on the object, starts outside every solid, and clears all opaque triangles but the object's.
+
+        Args:
+            rows: all pairs.
+            pairs: row of each attempt; a pair may be attempted through several boxes.
+            boxes: aim at the part of the object inside this box; ignored in round 0.
+            hints: ends of a line that the axial model allows [grid steps], shape (n, 2, 3).
+            streams: what tells the random streams of one source apart, shape (n,), int.
+            tries: sightlines per attempt.
+            number: of the round.
+        """
+        if not len(pairs):
+            return
+        source, target = rows.source[pairs], rows.target[pairs]
+        found, origin, end = launch_aim(
+            self.triangles,
+            self.targets,
+            self.cells[source],
+            boxes,
+            hints,
+            target,
+            self.ranges[target],
+            seeds(self.seed + 101 * (number + 1), source, streams),
+            np.full(len(pairs), number > 0),
+            tries=tries,
+            boxed=number > 0,
+            device=self.device,
+        )
+        good = np.flatnonzero(found)
+        good = good[self.outside(source[good], origin[good])]
+        rows.show(pairs[good], origin[good], end[good])
+
+
+def seeds(seed: int | np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """A random stream for each pair that depends on nothing else, shape (n,), int32."""
+    mixed = source.astype(np.uint64) * 0x9E3779B1 + target.astype(np.uint64) * 0x85EBCA77
+    mixed = (mixed + np.asarray(seed, np.uint64) * np.uint64(0xC2B2AE3D)) & np.uint64(0x7FFFFFFF)
+    return mixed.astype(np.int32)
+
+
+def middles(cells: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    """Line from the middle of each view cell to that of the box of its row, shape (n, 2, 3), float64."""
+    return np.stack([cells.mean(axis=1), boxes.mean(axis=1)], axis=1)

@@ -1,0 +1,119 @@
+"""Visibility of a model from the cells of its cell-and-portal graph: of cells and of objects."""
+
+from functools import cached_property
+
+import numpy as np
+import warp as wp
+
+from ...data.blockers import Blockers
+from ...data.graph import CellGraph
+from ...data.incidence import populate
+from ...data.patches import Patches
+from ...data.prepared import PreparedModel
+from ...data.regions import Regions
+from ...data.rows import Rows
+from ...kernels import line_tree, shaft, sightline, target, trace
+from ...kernels.launch import CPU, Device
+from . import aim as aiming
+from . import cells as cell_search
+from .aim import Sights
+from .cells import CellModel, cell_rows, join_cell_rows
+from .engine import Part, join_objects, unknown_rows
+from .ledger import Ledger
+from .objects import object_rows
+from .occluders import OccluderModel, hidden_boxes, refine_objects, seen_objects
+
+# With "auto" the occluders are asked about cells of whose potential objects more than this share is unknown.
+AUTO_UNKNOWN = 0.02
+LEAST_UNKNOWN = {"portals": np.inf, "both": 0.0, "auto": AUTO_UNKNOWN}
+
+
+class PortalEngine:
+    """An `Engine` for a model and its cell-and-portal graph."""
+
+    def __init__(
+        self,
+        model: PreparedModel,
+        graph: CellGraph,
+        *,
+        device: Device = CPU,
+        seed: int = 0,
+        method: str = "portals",
+        certify: bool = False,
+    ) -> None:
+        """Copy what visibility needs to the device.
+
+        Args:
+            model: the model.
+            graph: its cells and portals.
+            device: where to.
+            seed: of the random sightlines.
+            method: "portals"; "both" to ask the occluders about every pair that portals leave unknown; "auto" to ask
+                only where much is unknown.
+            certify: call hidden only what has a certificate, and keep it. All methods then hide by the model's
+                occluders, which can be checked against the model alone; "portals" leaves out oblique ones for cells.
+        """
+        self._certify, self._least_unknown = certify, LEAST_UNKNOWN[method]
+        self._objects = len(model.scene.objects)
+        self._sights = Sights.of(model, graph.cells, seed, device)
+        self._incidence = populate(model.scene, graph.cells)
+        blockers = model.regions.blockers if certify else model.blockers(graph)
+        self.model = CellModel(graph, blockers, self._sights, seed, device)
+
+    @property
+    def proof_occluders(self) -> tuple[Blockers, Regions, Patches]:
+        """As of `Engine`."""
+        return self.model.blockers, self._sights.model.regions, self._sights.model.patches
+
+    @cached_property
+    def occluders(self) -> OccluderModel:
+        """Occluders of the model, made when they are first asked."""
+        return OccluderModel.of(self._sights)
+
+    def compile(self) -> None:
+        """As of `Engine`."""
+        modules = [target, trace, sightline]
+        if self._least_unknown == 0.0 or self._certify:
+            modules.append(shaft)
+        if self._certify:
+            modules.append(line_tree)
+        for module in modules:
+            wp.load_module(module.__name__, device=self.model.device.name)
+
+    def visible(self, block: np.ndarray, *, aim: bool = True) -> Part:
+        """As of `Engine`."""
+        for_cells, for_objects = (cell_search.AIM_ROUNDS, aiming.AIM_ROUNDS) if aim else ((), ())
+        ledger = Ledger() if self._certify else None
+        cells = cell_rows(self.model, block, for_cells, ledger)
+        if self._least_unknown == 0.0:
+            cells = self._hide_cells(cells, ledger)
+        if ledger is not None:
+            return Part(cells, *seen_objects(self.occluders, block, for_objects, ledger))
+        objects = object_rows(self.model, self._incidence, cells, for_objects)
+        doubtful = ~objects.seen & self._unknown_sources(objects)[objects.source]
+        if doubtful.any():
+            better, _ = refine_objects(self.occluders, objects.take(doubtful), for_objects)
+            objects = Rows.join([objects.take(~doubtful), better]).order()
+        return Part(cells, objects)
+
+    def _unknown_sources(self, rows: Rows) -> np.ndarray:
+        """Cells that occluders are asked about, as too much of what they may see is unknown, shape (cells,), bool."""
+        count = self.model.graph.cell_count
+        unknown = np.bincount(rows.source[~rows.seen], minlength=count)
+        return unknown > np.minimum(self._least_unknown, 1.0) * np.bincount(rows.source, minlength=count)
+
+    def _hide_cells(self, rows: Rows, ledger: Ledger | None) -> Rows:
+        """Rows without the unknown cells that occluders hide."""
+        todo = np.flatnonzero(~rows.seen & (rows.source != rows.target))
+        kept = np.ones(len(rows), bool)
+        boxes = self.model.graph.cells[rows.target[todo]]
+        kept[todo] = ~hidden_boxes(self.occluders, rows.source[todo], boxes, ledger)
+        return rows.take(kept)
+
+    def unknown(self, block: np.ndarray) -> Part:
+        """As of `Engine`."""
+        return Part(unknown_rows(block, self.model.graph.cell_count), unknown_rows(block, self._objects))
+
+    def join(self, parts: list[Part]) -> tuple[Rows, Rows]:
+        """As of `Engine`; cells are made symmetric: A sees B exactly when B sees A."""
+        return join_cell_rows(self.model, [part.cells for part in parts]), join_objects(parts)

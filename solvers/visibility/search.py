@@ -1,0 +1,56 @@
+"""Target searches in rounds, and the sightlines that they find."""
+
+import numpy as np
+
+from ...data.verdict import Verdict
+from ...kernels.blockers import BlockerTree
+from ...kernels.launch import Device
+from ...kernels.target import TargetAnswers, launch_target_search
+
+# Lines tried per pair, then again for what stayed undecided.
+CAPS = (200, 20_000)
+
+
+def search_rounds(tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, device: Device) -> TargetAnswers:
+    """Target search with a small cap, then again with a larger one for the pairs that stayed undecided."""
+    answers = launch_target_search(tree, boxes, rows, cap=CAPS[0], device=device)
+    for cap in CAPS[1:]:
+        again = np.flatnonzero(answers.verdict == Verdict.UNKNOWN)
+        if len(again):
+            better = launch_target_search(tree, boxes, rows[again], cap=cap, device=device)
+            for name in TargetAnswers.__dataclass_fields__:
+                column = getattr(answers, name).copy()
+                column[again] = getattr(better, name)
+                setattr(answers, name, column)
+    return answers
+
+
+def segments(
+    answers: TargetAnswers, rows: np.ndarray, sources: np.ndarray, targets: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the found lines: a quarter into the source box and a quarter into the target box, on the witness grid.
+
+    Args:
+        answers: of a target search.
+        rows: answers to take.
+        sources: source box of each taken row [grid steps], shape (n, 2, 3).
+        targets: likewise.
+
+    Returns:
+        Origins and ends [grid steps], shape (n, 3), float64, multiples of 2**-10.
+    """
+    w, xi = answers.line[rows], answers.offset[rows]
+    sign = np.where((answers.octant[rows][:, None] >> np.arange(3)) & 1, -1.0, 1.0)
+
+    def times(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        ends = boxes.astype(float) * sign[:, None]
+        ends = np.stack([ends.min(axis=1), ends.max(axis=1)], axis=1)
+        low, high = w * ends[:, 0] - xi, w * ends[:, 1] - xi
+        return np.maximum.reduce(low.T), np.minimum.reduce(high.T)
+
+    def place(time: np.ndarray) -> np.ndarray:
+        return np.round(sign * (time[:, None] + xi) / w * 1024.0) / 1024.0
+
+    enter, leave = times(sources)
+    first, last = times(targets)
+    return place(leave - 0.25 * (leave - enter)), place(first + 0.25 * (last - first))

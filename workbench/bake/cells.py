@@ -1,0 +1,146 @@
+"""Where a bake looks from: cells and portals of a model, an octree, a table of boxes, or a bare graph."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...data.errors import InputError
+from ...data.graph import CellGraph
+from ...data.inhabit import find_inhabitable
+from ...data.portals import find_portals
+from ...data.prepared import PreparedModel
+from ...data.scene import GRID_LIMIT, GRID_M, Role
+from ...data.solids import dead_cells
+from ...data.store.graph_folder import read_graph
+from ...data.store.scene_folder import scene_manifest
+from ...data.store.view_cells import read_view_cells
+from ...data.subdivide import cut_rooms, merge, subdivide
+from ...data.view_cells import as_graph, octree_roots, walkable
+from .manifest import Clock
+from .settings import Settings
+
+MARGIN_M = 2.0
+# Models with more triangles than this are not cut into portal cells unless asked.
+PORTAL_TRIANGLES = 3_000_000
+
+
+@dataclass
+class Sources:
+    """A model and its cells, ready for visibility.
+
+    Attributes:
+        model: None for a bare graph.
+        graph: its cells; view cells have no portals.
+        facts: what the manifest says of it.
+        view_cells: whether the cells are view cells, about which nothing but objects is claimed.
+        method: what "auto" came to.
+        portal_graph: the cell-and-portal graph beside view cells, if the method wants one.
+    """
+
+    model: PreparedModel | None
+    graph: CellGraph
+    facts: dict
+    view_cells: bool
+    method: str
+    portal_graph: CellGraph | None = None
+
+    @property
+    def octree(self) -> bool:
+        """Whether cells may be refined."""
+        return self.facts.get("inhabitable_because") == "octree"
+
+
+def bare_sources(folder: Path, settings: Settings, clock: Clock) -> Sources:
+    """Cells of a bare graph.
+
+    Raises:
+        InputError: it is unreadable, or the settings want a model.
+    """
+    if settings.split or settings.lods:
+        raise InputError(f"{folder}: expected a model to split or to simplify, found a bare graph")
+    if settings.method in ("occluders", "both", "vlod") or settings.cells not in ("", "portals"):
+        raise InputError(f"{folder}: expected a model for occluders and view cells, found a bare graph")
+    graph, snapped = read_graph(folder)
+    clock.lap("read")
+    facts = {"source": str(folder), "sha256": "", "unit": "metre", "grid_m": GRID_M, "origin": [0.0] * 3}
+    facts |= {"max_snap_m": snapped, "skipped": [], "counts": {"objects": 0}}
+    return Sources(None, graph, facts, False, "portals")
+
+
+def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sources:
+    """Cells of a model as the settings want them.
+
+    Raises:
+        InputError: a method that cannot be had from such cells, or an unusable table.
+    """
+    scene = model.scene
+    facts = scene_manifest(scene)
+    if not model.closed:
+        facts["warnings"] = ["no closed opaque solid: only surfaces occlude, and every point counts as outside"]
+    clock.lap("read")
+    cells, method = settings.cells, settings.method
+    large = len(scene.triangles()[0]) > PORTAL_TRIANGLES
+    if not cells:
+        cells = "octree" if method in ("occluders", "vlod") or (method == "auto" and large) else "portals"
+    if cells == "portals" and method == "vlod":
+        raise InputError("cells: expected octree or a table for the method vlod, found portals")
+    if cells == "portals":
+        graph, notes = build_graph(model, settings, clock)
+        return Sources(model, graph, facts | notes, False, method)
+    if method == "auto":
+        method = "occluders"
+    # With certificates nothing is hidden by portals alone: the model is what a proof is checked against.
+    wanted = method in ("portals", "both") and not settings.certify
+    portal_graph = build_graph(model, settings, clock)[0] if wanted else None
+    if cells == "octree":
+        roots = octree_roots(scene, settings.cell_size_m)
+        graph, because = as_graph(roots[walkable(roots, model)]), "octree"
+    else:
+        graph, because = read_view_cells(cells, scene), "given"
+    if portal_graph is not None:
+        _check_inside(graph, portal_graph, method)
+    clock.lap("view cells")
+    return Sources(model, graph, facts | {"inhabitable_because": because}, True, method, portal_graph)
+
+
+def _check_inside(graph: CellGraph, portal_graph: CellGraph, method: str) -> None:
+    """The portal graph ends at its outermost faces, through which it knows no way: eyes beyond would see nothing.
+
+    Raises:
+        InputError: a view cell reaches out of it.
+    """
+    low, high = portal_graph.cells[:, 0].min(axis=0), portal_graph.cells[:, 1].max(axis=0)
+    beyond = np.flatnonzero((graph.cells[:, 0] < low).any(axis=1) | (graph.cells[:, 1] > high).any(axis=1))
+    if len(beyond):
+        raise InputError(
+            f"method {method}: expected view cells within {MARGIN_M:g} m of the model, found cell {beyond[0]} beyond; "
+            "the method occluders takes them"
+        )
+
+
+def build_graph(model: PreparedModel, settings: Settings, clock: Clock) -> tuple[CellGraph, dict]:
+    """Cells, portals and inhabitable cells of a model, and what the manifest says of them."""
+    scene, opaque = model.scene, model.planes
+    clock.lap("read")
+    margin = round(MARGIN_M / scene.grid_m)
+    # The grid's own limit is where the kernels stop being exact.
+    low, high = np.clip(scene.bounds() + np.array([[-margin], [margin]]), -GRID_LIMIT, GRID_LIMIT)
+    leaves = subdivide(opaque, low, high, settings.threshold_m2 / scene.grid_m**2)
+    rooms = [[s.vertices.min(axis=0), s.vertices.max(axis=0)] for s in scene.spaces]
+    boxes = np.round(np.array(rooms).reshape(-1, 2, 3) / scene.grid_m).astype(np.int64)
+    cells = cut_rooms(merge(leaves, opaque), boxes)
+    dead = dead_cells(cells, model.closed_of(Role.OCCLUDER))
+    clock.lap("subdivide")
+    graph = find_portals(cells[~dead], opaque)
+    inhabited = find_inhabitable(scene, graph)
+    graph.inhabitable, graph.cell_names = inhabited.mask, inhabited.names
+    clock.lap("portals")
+    notes = {
+        "inhabitable_because": inhabited.reason,
+        "leak_cells": inhabited.leak,
+        "dead_cells": int(dead.sum()),
+        "axial_area_m2": round(opaque.axial_area * scene.grid_m**2, 3),
+        "axial_area_lost_m2": round(opaque.lost_area * scene.grid_m**2, 3),
+    }
+    return graph, notes

@@ -1,0 +1,142 @@
+"""What a bake's answer depends on, in groups by what they speak of."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...data.camera import Screen
+from ...data.errors import InputError
+from ...solvers.levels.pixel_error import PixelLimit
+
+if TYPE_CHECKING:
+    from ...solvers.visibility.projection import VlodSettings
+
+METHODS = ("auto", "portals", "occluders", "both", "vlod")
+DEEPEST = 12
+
+
+@dataclass(frozen=True)
+class ModelSettings:
+    """How the model is taken.
+
+    Attributes:
+        doors: "open", or "closed" if doors occlude.
+        seal: cracks narrower than this are closed [m]; 0 closes none.
+        split: connected components become objects of their own.
+    """
+
+    doors: str = "open"
+    seal: float = 0.0
+    split: bool = False
+
+
+@dataclass(frozen=True)
+class CellSettings:
+    """Where one looks from.
+
+    Attributes:
+        cells: view cells: "portals" for those of the cell-and-portal graph, "octree", or a table of boxes. By default
+            the method's own.
+        threshold_m2: opaque area below which a plane does not cut cells; larger is faster and looser.
+        cell_size_m: of the octree's roots.
+        depth: times that a cell of the octree may be refined.
+        refine_triangles: a cell that may see more triangles is refined.
+        refine_gap: a cell is refined if a larger share of what it may see is unknown.
+    """
+
+    cells: str = ""
+    threshold_m2: float = 0.0
+    cell_size_m: float = 4.0
+    depth: int = 2
+    refine_triangles: int = 100_000
+    refine_gap: float = 0.25
+
+
+@dataclass(frozen=True)
+class MethodSettings:
+    """What proves things hidden.
+
+    Attributes:
+        method: "portals" (stabbing lines through a cell-and-portal graph), "occluders" (shadows of walls, furniture and
+            oblique surfaces), "both", "vlod" (the method of Chhugani et al. 2005: projection points and shrunk
+            occluders), or "auto": portals, and occluders for cells where portals leave much unknown, and for models too
+            large to be cut into cells.
+        certify: store a certificate of everything that is hidden, and call nothing else hidden.
+        seed: of the random sightlines.
+        clusters: of occluders by direction, for "vlod"; see `viewcell.solvers.visibility.projection.VlodSettings`.
+        objective: of projection points, for "vlod".
+        resolution: pixels on the side of a cube map's face, for "vlod".
+    """
+
+    method: str = "auto"
+    certify: bool = False
+    seed: int = 0
+    clusters: int = 14
+    objective: str = "socp"
+    resolution: int = 512
+
+    @property
+    def vlod(self) -> "VlodSettings":
+        """How the method "vlod" treats view cells.
+
+        Raises:
+            InputError: clusters, objective or resolution.
+        """
+        from ...solvers.visibility.projection import VlodSettings
+
+        return VlodSettings(self.clusters, self.objective, self.resolution, seed=self.seed)
+
+
+@dataclass(frozen=True)
+class LevelSettings:
+    """Levels of detail.
+
+    Attributes:
+        lods: simplify definitions that have a single level, and store which levels do from where.
+        pixels: a level may deviate on the image by no more.
+        image: width x height of the image that `pixels` are counted on.
+        fov_deg: its vertical field of view.
+    """
+
+    lods: bool = False
+    pixels: float = 1.0
+    image: str = "1920x1080"
+    fov_deg: float = 60.0
+
+    @property
+    def pixel_limit(self) -> PixelLimit:
+        """What levels are chosen for; raises InputError for a number out of range."""
+        width, _, height = self.image.partition("x")
+        if not (width.isdecimal() and height.isdecimal()):
+            raise InputError(f"image: expected WIDTHxHEIGHT in pixels, found {self.image!r}")
+        return PixelLimit(self.pixels, Screen(int(width), int(height), self.fov_deg))
+
+
+@dataclass(frozen=True)
+class Settings(LevelSettings, MethodSettings, CellSettings, ModelSettings):
+    """What a bake's answer depends on; each group says what its values mean."""
+
+    def check(self) -> None:
+        """Raise InputError for a value out of range."""
+        for name, value, least in (
+            ("threshold", self.threshold_m2, 0.0),
+            ("seal", self.seal, 0.0),
+            ("cell size", self.cell_size_m, 1e-3),
+            ("refine-triangles", self.refine_triangles, 1),
+            ("refine-gap", self.refine_gap, 0.0),
+        ):
+            check_number(name, value, least)
+        if self.seal > 0:
+            raise InputError(f"seal: expected 0 (closing cracks is not built yet), found {self.seal}")
+        if self.method not in METHODS:
+            raise InputError(f"method: expected {', '.join(METHODS)}, found {self.method!r}")
+        if not 0 <= self.depth <= DEEPEST:
+            raise InputError(f"depth: expected a whole number from 0 to {DEEPEST}, found {self.depth}")
+        _ = self.pixel_limit, self.vlod
+
+
+def check_number(name: str, value: float, least: float) -> None:
+    """Refuse a number below the least with an InputError."""
+    if not (np.isfinite(value) and value >= least):
+        raise InputError(f"{name}: expected a number {'above 0' if least else 'from 0'}, found {value}")
