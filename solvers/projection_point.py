@@ -45,8 +45,6 @@ BATCH = 64
 WORKING = 64
 ADDED = 8
 ROUNDS = 6
-# An occluder with a bounded umbra: no projection point gives it a shadow without limit. Follows the status of Umbras.
-BOUNDED = 4
 # A height that no occluder asks for in earnest, in cell diagonals: one hardly larger than the cell asks for any.
 MOST_HEIGHT = 1e3
 # Triples of planes are judged with this tolerance on their weights: parallel edges give weights of exactly zero.
@@ -97,16 +95,12 @@ class Problem:
         return hessian / largest, gradient / largest, bounds
 
 
-def excluded(umbras: Umbras) -> np.ndarray:
-    """Why each occluder takes no part: its status in `Umbras`, BOUNDED, or 0 (USABLE) if it does; shape (k,), int32."""
-    return np.where((umbras.status == USABLE) & np.isinf(lowest_points(umbras)), BOUNDED, umbras.status)
-
-
 def lowest_points(umbras: Umbras) -> np.ndarray:
     """Least n . x within the supporting half-spaces of each umbra, -inf where there is none, shape (k,).
 
     By duality it is the largest c . w over basic weights w >= 0 with sum w_e m_e = n, at most three of them above zero;
-    there are none where the umbra is bounded (BOUNDED). Not rounded to a side: it only steers the optimum.
+    there are none where the umbra is bounded, to which no projection point gives a shadow without limit. Not rounded to
+    a side: it only steers the optimum.
     """
     lowest = np.full(len(umbras.status), -np.inf)
     sizes = np.diff(umbras.starts)

@@ -117,7 +117,7 @@ def feasible_point(problem: Problem, *, seed: int = 0) -> Result:
 
 
 def vertex_point(problem: Problem) -> Result:
-    """The linear programme, by the simplex method of HiGHS.
+    """The linear programme, by the simplex method of HiGHS: the referee of `solve_points` in tests.
 
     Args:
         problem: a linear one, with at least one occluder.

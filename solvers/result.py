@@ -54,5 +54,5 @@ class Result:
     seconds: float
 
     def advice(self, row: int) -> str:
-        """What the status of one problem means and what to do."""
+        """What the status of one problem means and what to do, for who calls a solver from Python."""
         return ADVICE[Status(int(self.status[row]))]

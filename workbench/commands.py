@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from ..data.errors import InputError
 from .summary import summary, table
-from .terminal import FAILED, say
+from .terminal import FAILED, say, silenced
 
 if TYPE_CHECKING:
     from ..data.scene import Scene
@@ -228,9 +228,9 @@ def tune_lod(options: argparse.Namespace) -> int:
     _start_warp()
     made = load(options.bake)
     from ..solvers.levels.benefit import BenefitSettings
+    from .tune.candidates import default_out
     from .tune.lod import tune_lod as tune
     from .tune.lod import write_tuning
-    from .tune.page import default_out
 
     benefit = BenefitSettings(always=tuple(options.always))
     result = tune(
@@ -299,14 +299,8 @@ def _start_warp() -> None:
     import warp
 
     warp.config.log_level = warp.LOG_WARNING
-    stderr = os.dup(2)
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 2)
+    with silenced(2):
         warp.init()
-    finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)
 
 
 def _progress(options: argparse.Namespace) -> bool:
@@ -317,7 +311,8 @@ def _progress(options: argparse.Namespace) -> bool:
 def curves(options: argparse.Namespace) -> int:
     """Sweep the knobs, draw the curves and say which settings are worth their time."""
     from .baked import load
-    from .curves import curve_lines, sweep, write_curves
+    from .curves.plot import curve_lines, write_curves
+    from .curves.sweep import sweep
 
     if options.stability == (options.bake is not None):
         raise InputError("curves: expected a bake folder or --stability, found both or neither")

@@ -12,7 +12,7 @@ from viewcell.data.errors import InputError
 from viewcell.kernels import select
 from viewcell.kernels.launch import Device
 from viewcell.kernels.select import launch_select
-from viewcell.solvers.levels.greedy import incremental_greedy, literal_greedy
+from viewcell.solvers.levels.choosers import incremental_greedy, literal_greedy
 from viewcell.verify.exact.select import best_by_milp, best_by_table, upper_bound
 from viewcell.verify.strategies import knapsacks
 

@@ -22,7 +22,7 @@ from viewcell.verify.rays.adjudicate import Judgement
 from viewcell.verify.rays.starts import aim_points, cell_origins, frontier_points
 from viewcell.workbench import verify as workbench_verify
 from viewcell.workbench.bake.run import bake
-from viewcell.workbench.bench import flood as flood_bench
+from viewcell.workbench.bench import __main__ as benches
 from viewcell.workbench.bench import models as models_bench
 from viewcell.workbench.verify import make_judge, replay, verify_bake
 
@@ -367,17 +367,17 @@ def columns_of(printed):
 def test_bench_of_a_bare_graph(capsys, tmp_path):
     if not (SHARED / "graphs" / "w48").exists():
         pytest.skip("no shared graphs folder w48")
-    assert flood_bench.main([str(SHARED / "graphs" / "w48"), "--repeats", "1"]) == 0
+    assert benches.main(["flood", str(SHARED / "graphs" / "w48"), "--repeats", "1"]) == 0
     row = columns_of(capsys.readouterr().out)
     assert (row["cells"], row["portals"], row["ordered pairs"]) == ("182", "236", "6,994")
     assert row["unknown"] == row["asymmetric pairs"] == "0" and row["its sources, cut"] == "182 of 182, 0 cut"
-    assert flood_bench.main([str(tmp_path)]) == 2
+    assert benches.main(["flood", str(tmp_path)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_bench_of_a_model(capsys, tmp_path):
     write_scene(make_office(floors=1, rooms_per_side=1, furnished=False), tmp_path / "tiny.scene")
-    assert models_bench.main([str(tmp_path / "tiny.scene"), "--rays", "20000"]) == 0
+    assert benches.main(["models", str(tmp_path / "tiny.scene"), "--rays", "20000"]) == 0
     row = columns_of(capsys.readouterr().out)
     assert row["model"] == "tiny.scene" and row["wrong hidden"] == "0" and "flood" in row["seconds by phase"]
     assert row["undecided % of all pairs of cells"] == "0.0000" and row["witnesses confirmed, refuted"].endswith(", 0")

@@ -13,17 +13,27 @@ reach. No square roots are needed: the cone form min t, || diag(sqrt w) (N v - b
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from ...data.errors import InputError
 from ..arithmetic import dot
 
-if TYPE_CHECKING:
-    from ...solvers.projection_point import Problem
-
 Point = list[Fraction]
+
+
+class Programme(Protocol):
+    """Minimise sum w (n . v - b)**2, or sum w n . v, over rows . v >= bounds; what a solver was given."""
+
+    quadratic: bool
+    normals: np.ndarray
+    targets: np.ndarray
+    weights: np.ndarray
+    far: np.ndarray
+    rows: np.ndarray
+    bounds: np.ndarray
+    scale: float
 
 
 @dataclass(frozen=True)
@@ -50,7 +60,7 @@ class Optimality:
         return None if self.bound is None else self.value - self.bound
 
 
-def optimality(problem: "Problem", point: np.ndarray) -> Optimality:
+def optimality(problem: Programme, point: np.ndarray) -> Optimality:
     """Proof of how near the optimum a point is; of the weights only the quality is in float64.
 
     Args:
@@ -74,7 +84,7 @@ def optimality(problem: "Problem", point: np.ndarray) -> Optimality:
     return Optimality(value, bound, weights or {}, max(0, *(-s for s in slack)), behind)
 
 
-def relative_gap(problem: "Problem", point: np.ndarray) -> float:
+def relative_gap(problem: Programme, point: np.ndarray) -> float:
     """Proved distance from the optimum, relative to the value and what a cell diagonal makes; NaN without a bound.
 
     The second keeps optima of 0 comparable, where all occluders have their way.
@@ -84,7 +94,7 @@ def relative_gap(problem: "Problem", point: np.ndarray) -> float:
     return float(proved.gap / (proved.value + unit)) if proved.gap is not None else float("nan")
 
 
-def lower_bound(problem: "Problem", at: Point, weights: dict[int, Fraction]) -> Fraction | None:
+def lower_bound(problem: Programme, at: Point, weights: dict[int, Fraction]) -> Fraction | None:
     """What no feasible point undercuts, by weights of rows; None if they prove nothing. The checker of `Optimality`."""
     value, gradient = _value(problem, at)
     rows = {k: [Fraction(c) for c in problem.rows[k].tolist()] for k in weights}
@@ -94,7 +104,7 @@ def lower_bound(problem: "Problem", at: Point, weights: dict[int, Fraction]) -> 
     return value + sum(y * (Fraction(float(problem.bounds[k])) - dot(rows[k], at)) for k, y in weights.items())
 
 
-def _value(problem: "Problem", at: Point) -> tuple[Fraction, Point]:
+def _value(problem: Programme, at: Point) -> tuple[Fraction, Point]:
     """The objective and its gradient."""
     value, gradient = Fraction(0), [Fraction(0)] * 3
     terms = zip(problem.normals.tolist(), problem.targets.tolist(), problem.weights.tolist(), strict=True)
@@ -106,7 +116,7 @@ def _value(problem: "Problem", at: Point) -> tuple[Fraction, Point]:
     return value, gradient
 
 
-def _proposed(problem: "Problem", gradient: Point, slack: list[Fraction]) -> dict[int, Fraction]:
+def _proposed(problem: Programme, gradient: Point, slack: list[Fraction]) -> dict[int, Fraction]:
     """Weights near stationarity with the least sum of weight times slack, from a float64 linear programme."""
     from scipy.optimize import linprog
 
@@ -120,7 +130,7 @@ def _proposed(problem: "Problem", gradient: Point, slack: list[Fraction]) -> dic
     return {int(k): Fraction(float(answer.x[k])) * scale for k in np.flatnonzero(answer.x > 0)}
 
 
-def _stationary(problem: "Problem", gradient: Point, weights: dict[int, Fraction]) -> dict[int, Fraction] | None:
+def _stationary(problem: Programme, gradient: Point, weights: dict[int, Fraction]) -> dict[int, Fraction] | None:
     """The weights, with what is missing of the gradient put on rows along the axes; None if there is no such row."""
     out = dict(weights)
     rows = problem.rows.tolist()

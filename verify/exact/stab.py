@@ -71,8 +71,8 @@ def stab(boxes: np.ndarray, signs: tuple[int, int, int]) -> Stab:
 def stab_closed(boxes: np.ndarray, signs: tuple[int, int, int]) -> Stab:
     """Whether a line of the closed octant (zero components included) touches all closed boxes.
 
-    Args and errors as for `stab`. HIDDEN carries the certificate of the open octant; the axis-parallel directions are
-    excluded by the search itself.
+    For case files and tests, which tell what is grazed from what is missed. Args and errors as for `stab`. HIDDEN has
+    the certificate of the open octant; the axis-parallel directions are excluded by the search itself.
     """
     low, high = _mirrored(boxes, signs)
     w, certificate, graze = _search(low, high)

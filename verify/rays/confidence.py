@@ -36,7 +36,7 @@ class Confidence:
             return np.where(self.rays > 0, -SPHERE * np.expm1(np.log(share) / np.maximum(self.rays, 1)), SPHERE)
 
     def chance_missed(self, hole_sr: float) -> float:
-        """Greatest chance, over the cells, that a hole of this size [sr] in the cell was missed."""
+        """Greatest chance, over the cells, that a hole of a size of one's own [sr] in the cell was missed."""
         if not len(self.rays):
             return 1.0
         return float(np.max((1.0 - min(hole_sr, SPHERE) / SPHERE) ** self.rays))

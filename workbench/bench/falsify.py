@@ -1,6 +1,6 @@
 """Omissions planted in true potentially visible sets: how soon does each way of casting rays find them?
 
-Usage: python -m viewcell.workbench.bench.falsify [SCENE ...] [--bake FOLDER] [--rays N] [--seconds S] [--omissions N]
+Usage: python -m viewcell.workbench.bench falsify [SCENE ...] [--bake FOLDER] [--rays N] [--seconds S] [--omissions N]
 
 Pairs with an exactly confirmed witness are taken out of the claim, so many of each decade of solid angle: the mean over
 free points of the view cell of the solid angle under which the object is seen. All are planted together; single ones
@@ -9,7 +9,6 @@ beside show whether the others helped. Found means confirmed by exact adjudicati
 
 import argparse
 import math
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -22,7 +21,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...data.buildings.office import make_office
-from ...data.errors import InputError
 from ...data.readers import read
 from ...data.store.bake_folder import read_bake
 from ...verify.rays.adjudicate import Judge, Judgement, sightline_end
@@ -32,7 +30,7 @@ from ...verify.rays.starts import ORIGINS_MOST, cell_origins
 from ...verify.rays.witness import visible_rows
 from ..bake.run import bake
 from ..verify import make_caster, make_judge
-from .timing import commit, print_head, print_row, quiet
+from .timing import commit, print_head, print_row
 
 if TYPE_CHECKING:
     from ...data.store.bake_folder import BakeFolder
@@ -367,9 +365,8 @@ def compare(made: "BakeFolder", name: str, options: argparse.Namespace) -> None:
         print_single(setting, planted, outcomes["falsifier"], options)
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Print the tables of each scene."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of `run`."""
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help="by default the office")
     parser.add_argument("--bake", action="append", default=[], metavar="FOLDER", help="use this bake")
     parser.add_argument("--rays", type=int, default=10**9, help="at most, for each way")
@@ -378,20 +375,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--single", type=int, default=0, help="of them planted alone as well")
     parser.add_argument("--ways", default="uniform,verify,falsifier", help="separated by commas; also 'without NAME'")
     parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args(arguments)
-    quiet()
-    try:
-        for folder in options.bake:
-            compare(read_bake(folder), Path(folder).name, options)
-        for scene in options.scenes or ([] if options.bake else ["office"]):
-            with tempfile.TemporaryDirectory() as folder:
-                model = make_office() if scene == "office" else read(scene)
-                compare(bake(model, Path(folder) / "true.bake"), Path(scene).name, options)
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return 2
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the tables of each scene. Returns the exit code."""
+    for folder in options.bake:
+        compare(read_bake(folder), Path(folder).name, options)
+    for scene in options.scenes or ([] if options.bake else ["office"]):
+        with tempfile.TemporaryDirectory() as folder:
+            model = make_office() if scene == "office" else read(scene)
+            compare(bake(model, Path(folder) / "true.bake"), Path(scene).name, options)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,11 +1,10 @@
 """Visibility of bare cell graphs: seconds on one and two threads, beside a plain portal-sequence search.
 
-Run `python -m viewcell.workbench.bench.flood FOLDER...` on folders with cells.parquet and portals.parquet.
+Run `python -m viewcell.workbench.bench flood FOLDER...` on folders with cells.parquet and portals.parquet.
 """
 
 import argparse
 import statistics
-import sys
 import time
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from ...data.store.graph_folder import read_graph
 from ...kernels.flood import launch_flood
 from ...kernels.launch import Device
 from ...solvers.visibility.graph_engine import GraphEngine
-from .timing import commit, median_range, print_head, print_row, quiet
+from .timing import commit, median_range, print_head, print_row
 
 REPEATS = 7
 THREADS = (1, 2)
@@ -119,25 +118,18 @@ def bench(folder: Path, repeats: int, limit_s: float) -> list[object]:
     ]
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Print the table; compiling is excluded. Returns the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of `run`."""
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
     parser.add_argument("--repeats", type=int, default=REPEATS)
     parser.add_argument("--limit", type=float, default=60.0, help="seconds of the plain search (default 60)")
-    options = parser.parse_args(argv)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the table; compiling is excluded. Returns the exit code."""
     if options.repeats < 1:
-        parser.error(f"--repeats: expected 1 or more, found {options.repeats}")
-    quiet()
+        raise InputError(f"repeats: expected 1 or more, found {options.repeats}")
     print_head(HEAD)
-    try:
-        for folder in options.folders:
-            print_row(bench(folder, options.repeats, options.limit))
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return 2
+    for folder in options.folders:
+        print_row(bench(folder, options.repeats, options.limit))
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

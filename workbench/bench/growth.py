@@ -18,7 +18,7 @@ from ...solvers.visibility.graph_engine import GraphEngine
 from ...solvers.visibility.occluders import OccluderModel, seen_objects
 from .rows.objects import PIECES, SMALLEST, boxes_in_spaces
 from .rows.portals import random_rooms
-from .select import problem
+from .rows.solvers import knapsacks
 from .suite import clock
 
 RUNS = 3
@@ -128,7 +128,7 @@ def select_growth(device: Device, advance: Callable[[], None]) -> list[Growth]:
     """One frame's selection, against objects."""
     ms = []
     for objects in OBJECTS:
-        asked = problem(objects, 1, 0.3, seed=objects)
+        asked = knapsacks(objects, 1, 0.3, seed=objects)
         ms.append(median_ms(partial(launch_select, *asked, device=device), device))
         advance()
     return grown("select", "one frame", {"objects": [*OBJECTS]}, ms)

@@ -1,10 +1,9 @@
 """Whole models: each is baked and verified, time beside error.
 
-Run `python -m viewcell.workbench.bench.models MODEL... [--rays N]`; a MODEL is anything that `viewcell bake` takes.
+Run `python -m viewcell.workbench.bench models MODEL... [--rays N]`; a MODEL is anything that `viewcell bake` takes.
 """
 
 import argparse
-import sys
 import tempfile
 from pathlib import Path
 
@@ -12,7 +11,6 @@ import numpy as np
 
 from ... import bake
 from ...data.blockers import find_blockers
-from ...data.errors import InputError
 from ...data.prepared import PreparedModel
 from ...data.store.bake_folder import BakeFolder
 from ...data.verdict import Verdict
@@ -20,7 +18,8 @@ from ...kernels.blockers import blocker_tree
 from ...kernels.launch import Device
 from ...solvers.visibility.search import search_rounds
 from ...verify.findings import Counts, VerifyResult
-from .timing import commit, print_head, print_row, quiet
+from ..terminal import FAILED
+from .timing import commit, print_head, print_row
 
 RAYS = 1_000_000
 HEAD = (
@@ -83,27 +82,20 @@ def columns(name: str, made: BakeFolder, result: VerifyResult) -> list[object]:
     ]
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Print the table. Returns the exit code: 1 if something forbidden was found."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of `run`."""
     parser.add_argument("models", nargs="+", type=Path, metavar="MODEL")
     parser.add_argument("--rays", type=int, default=RAYS)
-    options = parser.parse_args(argv)
-    quiet()
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the table; fails if something forbidden was found. Returns the exit code."""
     print_head(HEAD)
     stood = True
-    try:
-        for model in options.models:
-            with tempfile.TemporaryDirectory() as scratch:
-                made = bake(model, Path(scratch) / f"{model.stem}.bake")
-                result = made.verify(rays=options.rays)
-                print_row(columns(model.name, made, result))
-                stood &= result.ok
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0 if stood else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    for model in options.models:
+        with tempfile.TemporaryDirectory() as scratch:
+            made = bake(model, Path(scratch) / f"{model.stem}.bake")
+            result = made.verify(rays=options.rays)
+            print_row(columns(model.name, made, result))
+            stood &= result.ok
+    return 0 if stood else FAILED

@@ -1,13 +1,12 @@
 """From-region occlusion, method beside method: how much each leaves potential, against what is seen, and in what time.
 
-Run `python -m viewcell.workbench.bench.occlusion MODEL... [--cells N] [--rays N]`; a MODEL is anything that
+Run `python -m viewcell.workbench.bench occlusion MODEL... [--cells N] [--rays N]`; a MODEL is anything that
 `viewcell bake` takes, or `office`. View cells are N boxes of 1 m and N as large as a room, drawn at random where
 somebody may stand under a ceiling. Seen is what a witness of the bake or one of the rays shows.
 """
 
 import argparse
 import statistics
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -32,7 +31,7 @@ from ...solvers.visibility.projection import VlodSettings, vlod_hidden
 from ...verify.rays.witness import witnessed_objects
 from ..bake.settings import Settings
 from ..verify import seen_by_rays
-from .timing import commit, print_head, print_row, quiet
+from .timing import commit, print_head, print_row
 
 RAYS = 10_000_000
 CELLS = 10
@@ -203,25 +202,18 @@ def compare(scene: Scene, name: str, count: int, rays: int, only: str) -> None:
         print_row([*columns, wrong])
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Print a table for each model."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("models", nargs="+", metavar="MODEL")
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of `run`."""
+    parser.add_argument("models", nargs="+", metavar="MODEL", help="or the word office")
     parser.add_argument("--cells", type=int, default=CELLS, help="of each size")
     parser.add_argument("--rays", type=int, default=RAYS, help="over all cells")
     parser.add_argument("--only", default="", help="letters of the variants, separated by commas")
-    options = parser.parse_args(arguments)
-    quiet()
-    print(f"commit {commit()}, one CPU thread; ms a cell: median (least-most), or mean of cells done together")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print a table for each model. Returns the exit code."""
+    print(f"commit {commit()}, one CPU thread; ms per cell: median (least-most), or mean of cells done together")
     for model in options.models:
-        try:
-            scene = make_office() if model == "office" else read(model)
-            compare(scene, Path(model).name, options.cells, options.rays, options.only)
-        except InputError as error:
-            print(error, file=sys.stderr)
-            return 2
+        scene = make_office() if model == "office" else read(model)
+        compare(scene, Path(model).name, options.cells, options.rays, options.only)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

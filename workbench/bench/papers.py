@@ -1,10 +1,9 @@
 """The tables of the four papers beside what this software measures: writes docs/papers.md.
 
-Run `python -m viewcell.workbench.bench.papers --out docs/papers.md` (some minutes).
+Run `python -m viewcell.workbench.bench papers --out docs/papers.md` (some minutes).
 """
 
 import argparse
-import sys
 import tempfile
 import time
 from dataclasses import dataclass
@@ -35,7 +34,7 @@ from ...solvers.visibility.projection import (
 from ..bake.settings import Settings
 from ..walk.path import potential_on, walk
 from .occlusion import sample_cells
-from .timing import commit, quiet
+from .timing import commit
 
 NONE = "\N{EN DASH}"
 FRAMES = 300
@@ -318,7 +317,7 @@ def page(parts: dict[str, dict[str, list[Line]]]) -> str:
     lines = [
         "# The papers' tables beside ours",
         "",
-        f"Made by `python -m viewcell.workbench.bench.papers` at commit {commit()}. Scenes are synthetic stand-ins of "
+        f"Made by `python -m viewcell.workbench.bench papers` at commit {commit()}. Scenes are synthetic stand-ins of "
         "the published ones (`viewcell make office --like soda-hall`, `viewcell make plant`), machines up to thirty "
         "years apart: counts compare, seconds tell the distance only. A dash is what this software cannot measure.",
     ]
@@ -330,12 +329,13 @@ def page(parts: dict[str, dict[str, list[Line]]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of `run`."""
     parser.add_argument("--out", default="docs/papers.md", help="file to write")
-    options = parser.parse_args(arguments)
-    quiet()
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the page. Returns the exit code."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         parts = {
@@ -347,7 +347,3 @@ def main(arguments: list[str] | None = None) -> int:
     Path(options.out).write_text(page(parts), encoding="utf-8")
     print(f"written to {options.out}")
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

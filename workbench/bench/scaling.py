@@ -1,6 +1,6 @@
 """Bakes by occluders of ever larger synthetic scenes: seconds by phase, cost of a view cell, memory, overestimate.
 
-Run `python -m viewcell.workbench.bench.scaling --scene plant --triangles 100000 1000000 --cells 1000 --budget 300 --out
+Run `python -m viewcell.workbench.bench scaling --scene plant --triangles 100000 1000000 --cells 1000 --budget 300 --out
 FOLDER`. View cells are boxes of 1 m to 2 m drawn at random in the scene's spaces. Each size runs in a process of its
 own, so that its peak memory is its own. The table goes to standard output, and with the picture into FOLDER.
 """
@@ -8,11 +8,11 @@ own, so that its peak memory is its own. The table goes to standard output, and 
 import argparse
 import multiprocessing
 import resource
-import sys
 import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +23,10 @@ from matplotlib.figure import Figure
 from ... import bake
 from ...data.buildings.city import make_city
 from ...data.buildings.plant import make_plant
-from ...data.errors import InputError
 from ...data.scene import Scene
 from ...data.store.graph_folder import CELL_COLUMNS
 from ..bake.settings import Settings
-from .timing import commit, quiet
+from .timing import commit
 
 SCENES = {"plant": make_plant, "city": make_city}
 CELL_M = (1.0, 2.0)
@@ -114,7 +113,6 @@ def cells_in_spaces(scene: Scene, count: int, seed: int = 0) -> np.ndarray:
 
 def measure(name: str, triangles: int, cells: int, budget_s: float, device: str) -> Measured:
     """Make a scene and bake it; call it in a fresh process."""
-    quiet()
     started = time.perf_counter()
     scene = SCENES[name](triangles=triangles)
     made_s = time.perf_counter() - started
@@ -163,35 +161,28 @@ def draw(rows: list[Measured], path: Path) -> None:
     figure.savefig(path, dpi=120)
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Print the table and write it and its picture. Returns the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of `run`."""
     parser.add_argument("--scene", nargs="+", choices=[*SCENES], default=["plant"])
     parser.add_argument("--triangles", nargs="+", type=int, default=[100_000, 1_000_000])
     parser.add_argument("--cells", type=int, default=1000)
     parser.add_argument("--budget", type=float, default=300.0, help="seconds of visibility for each bake")
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--out", type=Path, required=True, metavar="FOLDER")
-    options = parser.parse_args(argv)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the table and write it and its picture. Returns the exit code."""
     options.out.mkdir(parents=True, exist_ok=True)
     lines = ["| " + " | ".join(HEAD) + " |", "|" + "---|" * len(HEAD)]
     print(*lines, sep="\n", flush=True)
     rows = []
-    for name in options.scene:
-        for triangles in options.triangles:
-            case = (name, triangles, options.cells, options.budget, options.device)
-            try:
-                with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-                    rows.append(pool.submit(measure, *case).result())
-            except InputError as error:
-                print(error, file=sys.stderr)
-                return 2
-            lines.append("| " + " | ".join(rows[-1].columns()) + " |")
-            print(lines[-1], flush=True)
-            (options.out / "scaling.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
-            draw(rows, options.out / "scaling.png")
+    for name, triangles in product(options.scene, options.triangles):
+        case = (name, triangles, options.cells, options.budget, options.device)
+        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+            rows.append(pool.submit(measure, *case).result())
+        lines.append("| " + " | ".join(rows[-1].columns()) + " |")
+        print(lines[-1], flush=True)
+        (options.out / "scaling.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        draw(rows, options.out / "scaling.png")
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

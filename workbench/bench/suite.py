@@ -8,13 +8,12 @@ import contextlib
 import ctypes
 import gc
 import math
-import os
 import platform
 import resource
 import statistics
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, astuple, dataclass, fields
 from importlib import import_module
 from pathlib import Path
@@ -243,20 +242,6 @@ def timed(work: Callable[[], object], device: Device, *, limit_s: float = math.i
     finally:
         gc.enable()
     return times
-
-
-@contextlib.contextmanager
-def silenced() -> Iterator[None]:
-    """No output of compiled libraries: SciPy's HiGHS prints debugging lines that no option turns off."""
-    sys.stdout.flush()
-    kept = os.dup(1)
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 1)
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
 
 
 class PeakMemory:

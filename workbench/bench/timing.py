@@ -1,11 +1,9 @@
-"""What the benchmarks share: the commit they ran on, a median with its range, Warp without its greeting."""
+"""What the benchmarks share: the commit they ran on, a median with its range, rows of a table."""
 
 import statistics
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
-
-import warp as wp
 
 
 def commit() -> str:
@@ -20,11 +18,6 @@ def commit() -> str:
 def median_range(values: Sequence[float]) -> str:
     """Median (least-most)."""
     return f"{statistics.median(values):,.3f} ({min(values):,.3f}-{max(values):,.3f})"
-
-
-def quiet() -> None:
-    """Keep Warp from printing into the table."""
-    wp.config.log_level = wp.LOG_WARNING
 
 
 def print_row(columns: Sequence[object]) -> None:

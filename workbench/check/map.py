@@ -18,7 +18,6 @@ from ...verify.rays.confidence import LEVEL
 from ...verify.rays.windings import WindingLines
 from .graph import check_graph
 
-SUFFIXES = (".bsp", ".prt")
 # Lines followed from each leaf between two looks at what they found.
 ROUND_LINES = 2_000
 

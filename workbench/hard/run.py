@@ -13,7 +13,8 @@ import warp as wp
 
 from ...kernels.launch import Device
 from ...verify.cases.hard_cases import FOLDER, HardCases, load_hard_cases
-from .kernels import KERNELS, Outcome
+from .kernels import KERNELS
+from .outcomes import Outcome
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ kernels as the hard cases are. A kernel may withhold; it may refuse what its lau
 is a bug. Beside them rays of Embree in float32 without an exact test, which is what most bakers trust.
 """
 
-import io
 import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -25,9 +24,10 @@ from ...verify.cases.hard_cases import HardCases, RegionCase, Shape, SightlineCa
 from ...verify.exact.stab import stab
 from ...verify.rays.embree import embree_scene
 from ..files import write_files
+from ..pages import MARKERS, png
 from ..summary import table
-from ..tune.plots import MARKERS
-from .kernels import KERNELS, Outcome
+from .kernels import KERNELS
+from .outcomes import Outcome
 
 # Okabe and Ito's seven; the last one is for what is wrong.
 PALETTE = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#000000", "#d55e00")
@@ -261,9 +261,7 @@ def stability_plot(rows: list[Row]) -> bytes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=9, frameon=False)
-    out = io.BytesIO()
-    figure.savefig(out, dpi=110, format="png")
-    return out.getvalue()
+    return png(figure)
 
 
 def _draw(axes: object, rows: list[Row], colour: str, marker: str, label: str) -> None:

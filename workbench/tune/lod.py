@@ -1,7 +1,6 @@
 """Tune the choice of levels of detail: candidates over the user's own scene, path and budgets; time against error."""
 
 import json
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -25,8 +24,8 @@ from ...solvers.levels.benefit import (
     find_sightings,
     find_tuples,
 )
+from ...solvers.levels.choosers import branch_and_bound, incremental_greedy, literal_greedy
 from ...solvers.levels.cost_model import CostModel, read_samples
-from ...solvers.levels.greedy import incremental_greedy, literal_greedy
 from ...solvers.levels.select_frames import (
     Chooser,
     Coherence,
@@ -37,14 +36,15 @@ from ...solvers.levels.select_frames import (
     select_frames,
 )
 from ..files import write_files
-from ..summary import table
+from ..pages import html_page
+from ..terminal import silenced
 from ..walk.path import potential_on, read_path, walk
 from ..walk.software_renderer import SAMPLE_FRAMES, SoftwareRenderer, fit_renderer, measure_samples
+from .outcomes import Outcome, Tuning, percent
 
 FRAMES = 300
 # Budgets unless given: parts of the work in the 95th percentile of the frames at its finest, beside an empty frame.
 SHARES = (0.3, 0.5, 0.7)
-ROUNDING = 1.0e-9
 COHERENCE = Coherence(hysteresis=0.1, slack=0.02)
 # HiGHS solves and the software renderer draws the same frames.
 DRAWN_FRAMES = 20
@@ -71,17 +71,8 @@ def _incremental(b: np.ndarray, c: np.ndarray, s: np.ndarray, budget: int, previ
 
 
 def _highs(b: np.ndarray, c: np.ndarray, s: np.ndarray, budget: int, _: np.ndarray) -> np.ndarray:
-    """By branch and bound, whose library prints what no setting silences."""
-    from ..bench.select import highs
-
-    stdout = os.dup(1)
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 1)
-        return highs(b, c, s, budget)[0]
-    finally:
-        os.dup2(stdout, 1)
-        os.close(stdout)
+    with silenced():
+        return branch_and_bound(b, c, s, budget)[0]
 
 
 KERNEL, HIGHS = "kernel", "HiGHS, default gap"
@@ -92,91 +83,6 @@ CHOOSERS: dict[str, Chooser] = {
     "literal greedy": lambda b, c, s, budget, _: literal_greedy(b, c, s, budget)[0],
     HIGHS: _highs,
 }
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """One candidate at one budget, along the path.
-
-    Attributes:
-        method: of CHOOSERS.
-        coherent: whether with hysteresis and slack.
-        budget_ms: frame time asked for.
-        frames: how many were chosen for.
-        lost_mean: mean of 1 - value / certified bound: what the best choice could have more is no more than that.
-        lost_most: the largest.
-        kept_detail: value over that of all finest levels, over all frames.
-        switches: objects a frame that change level; None where the frames do not follow one another.
-        switch_share: of the objects shown; likewise.
-        modelled_misses: share of frames whose modelled time is above the budget.
-        measured_misses: likewise of those drawn by the software renderer; None if the costs are not its own.
-        choose_ms: median time to choose a frame's levels.
-        dropped: objects that must be drawn and did not fit, in all frames.
-    """
-
-    method: str
-    coherent: bool
-    budget_ms: float
-    frames: int
-    lost_mean: float
-    lost_most: float
-    kept_detail: float
-    switches: float | None
-    switch_share: float | None
-    modelled_misses: float
-    measured_misses: float | None
-    choose_ms: float
-    dropped: int
-
-
-def _percent(share: float) -> str:
-    """A loss in percent; below the bound's own rounding it is none."""
-    return f"{100 * share:.3g}" if share > ROUNDING else "0"
-
-
-@dataclass
-class Tuning:
-    """What was tried and what came of it.
-
-    Attributes:
-        cost: fitted model.
-        samples: measured frames, by column; None if the user gave them.
-        outcomes: every candidate at every budget.
-        best: recommended method.
-        best_coherent: whether with hysteresis and slack.
-        reason: why, in words.
-        modelled_ms: by name, modelled frame times along the path at the middle budget, shape (frames,).
-        budgets_ms: frame times tried, ascending.
-        notes: what else a reader should know, in sentences.
-    """
-
-    cost: CostModel
-    samples: dict[str, np.ndarray] | None
-    outcomes: list[Outcome]
-    best: str
-    best_coherent: bool
-    reason: str
-    modelled_ms: dict[str, np.ndarray]
-    budgets_ms: list[float]
-    notes: list[str]
-
-    def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Head and rows of the table."""
-        head = ("budget ms", "method", "coherence", "lost %, mean", "worst", "of finest %", "switches a frame")
-        head += ("over target %", "measured %", "choosing ms")
-        rows = []
-        for o in self.outcomes:
-            measured = "-" if o.measured_misses is None else f"{100 * o.measured_misses:.0f}"
-            switches = "-" if o.switches is None else f"{o.switches:.2f}"
-            marks = ("yes" if o.coherent else "no", _percent(o.lost_mean), _percent(o.lost_most))
-            rest = (f"{100 * o.kept_detail:.1f}", switches, f"{100 * o.modelled_misses:.1f}", measured)
-            rows.append((f"{o.budget_ms:.3g}", o.method, *marks, *rest, f"{o.choose_ms:.2f}"))
-        return head, rows
-
-    def text(self) -> str:
-        """Everything that is printed."""
-        head, rows = self.rows()
-        return "\n".join([self.cost.line(), *self.notes, "", table(head, rows), "", self.reason])
 
 
 # Method, coherence, frame time [ms], what was chosen, and the bound of each of its frames.
@@ -403,8 +309,8 @@ def recommend(outcomes: Sequence[Outcome]) -> tuple[str, bool, str]:
     plain = mean("switches", (best[0], False) if (best[0], False) in settings else best)
     reason = (
         f"recommended: {best[0]}, {'with' if best[1] else 'without'} coherence. Of all that change few levels it loses "
-        f"least: {_percent(mean('lost_mean', best))} % of the certified bound on average, "
-        f"{_percent(most('lost_most', best))} % at worst; {mean('switches', best):.2f} levels change a frame "
+        f"least: {percent(mean('lost_mean', best))} % of the certified bound on average, "
+        f"{percent(most('lost_most', best))} % at worst; {mean('switches', best):.2f} levels change a frame "
         f"({plain:.2f} without coherence); {100 * most('modelled_misses', best):.1f} % of the frames miss their "
         f"modelled time; {mean('choose_ms', best):.2f} ms to choose (rule: {RULE})"
     )
@@ -429,13 +335,16 @@ def write_tuning(
     Raises:
         InputError: the folder cannot be written.
     """
-    from .plots import lod_page, lod_plot
+    from .lod_plot import lod_plot
 
     folder, name = Path(out), Path(bake.folder).name
 
     def files() -> dict[str, bytes]:
         picture = lod_plot(tuning, name)
-        made = {"tune-lod.png": picture, "tune-lod.html": lod_page(tuning, name, picture).encode()}
+        head, rows = tuning.rows()
+        title, notes = f"Choosing levels of detail in {name}", [tuning.cost.line(), *tuning.notes]
+        page = html_page(title, picture, head, rows, notes, lead=tuning.reason)
+        made = {"tune-lod.png": picture, "tune-lod.html": page.encode()}
         if tuning.samples is not None:
             samples = pa.BufferOutputStream()
             pyarrow.csv.write_csv(pa.table(tuning.samples), samples)

@@ -12,7 +12,7 @@ from tqdm import tqdm
 from ...data.errors import InputError
 from ...data.prepared import PreparedModel
 from ...verify.rays.witness import witnessed_objects
-from .page import Candidate, default_out, pareto_front, write_tune
+from .candidates import Candidate, default_out, front_of, write_tune
 
 if TYPE_CHECKING:
     from ...data.store.bake_folder import BakeFolder
@@ -306,7 +306,7 @@ def point_lines(found: PointTuning) -> str:
     """The tables for people."""
     from ..summary import table
 
-    front = pareto_front(found.candidates)
+    front = front_of(found.candidates)
     names = list(found.candidates[0].numbers)
     rows = [
         (

@@ -27,9 +27,13 @@ from viewcell.verify.exact.sightline import Sight, Sightlines
 from viewcell.verify.exact.trace import portal_links, portal_path
 from viewcell.workbench.bake.settings import METHODS
 from viewcell.workbench.cli import main
-from viewcell.workbench.hard import kernels as hard_kernels
+from viewcell.workbench.hard import bakes, meshes, searches, shadows
 from viewcell.workbench.hard import run as hard_cases
+from viewcell.workbench.hard.bakes import write_model
+from viewcell.workbench.hard.kernels import KERNELS
+from viewcell.workbench.hard.outcomes import Outcome
 from viewcell.workbench.hard.run import Row, hard_cases_table, run_hard_cases
+from viewcell.workbench.hard.searches import graph_of
 
 CASES = load_hard_cases()
 # Kernels that take seconds.
@@ -87,13 +91,13 @@ def backface_answer(case):
 
 def graph_answer(case):
     """Pairs of cells that an exact stabbing line joins."""
-    reached = random_buildings.reached_matrix(hard_kernels.graph_of(case))
+    reached = random_buildings.reached_matrix(graph_of(case))
     return set(map(tuple, np.argwhere(np.triu(reached, 1)).tolist()))
 
 
 def walks_answer(case):
     """Cells where the walks end."""
-    graph, found = hard_kernels.graph_of(case), []
+    graph, found = graph_of(case), []
     for walk in case.walks:
         origin, end = np.array(walk.segment)
         holding = np.flatnonzero(((graph.cells[:, 0] < end) & (graph.cells[:, 1] > end)).all(axis=1)).tolist()
@@ -107,7 +111,7 @@ def walks_answer(case):
 def model_answer(case):
     """(cell, object) pairs that the from-region twin finds visible in the model as it was read."""
     with TemporaryDirectory() as name:
-        path, table = hard_kernels.write_model(case, Path(name))
+        path, table = write_model(case, Path(name))
         scene = read(path)
         cells = read_view_cells(table, scene).cells.tolist()
     assert len(scene.objects) == len(case.objects) and not scene.skipped
@@ -179,9 +183,7 @@ def test_models_far_away_are_read_with_their_digits():
     assert max(numbers) > 100_000 and max(len(repr(c)) for c in numbers) >= 16
 
 
-@pytest.mark.parametrize(
-    "kernel", [pytest.param(k, marks=[pytest.mark.slow] if k in LONG else []) for k in hard_kernels.KERNELS]
-)
+@pytest.mark.parametrize("kernel", [pytest.param(k, marks=[pytest.mark.slow] if k in LONG else []) for k in KERNELS])
 def test_no_kernel_is_wrong(kernel):
     (row,) = run_hard_cases(["cpu"], kernels=[kernel])
     assert not row.wrong
@@ -190,10 +192,10 @@ def test_no_kernel_is_wrong(kernel):
 
 def test_boxes_in_cube_maps():
     """A point at the viewpoint is in no face's pyramid, and once was called covered."""
-    judge = hard_kernels.KERNELS["launch_occludees"](CASES, CPU)
+    judge = KERNELS["launch_occludees"](CASES, CPU)
     outcomes = dict(islice(judge, len(CASES.coverage)))
-    assert outcomes["box at the viewpoint"] is hard_kernels.Outcome.RIGHT
-    assert hard_kernels.Outcome.WRONG not in outcomes.values()
+    assert outcomes["box at the viewpoint"] is Outcome.RIGHT
+    assert Outcome.WRONG not in outcomes.values()
 
 
 def test_every_kernel_has_cases():
@@ -202,7 +204,7 @@ def test_every_kernel_has_cases():
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and node.name.startswith("launch_") and path.stem != "launch":
                 found.add(node.name)
-    assert found <= set(hard_kernels.KERNELS)
+    assert found <= set(KERNELS)
 
 
 def hide_all(answers):
@@ -268,23 +270,29 @@ BROKEN = {
 }
 
 
+def spoil_all(monkeypatch, name, spoil):
+    """Spoil what a kernel says wherever the hard cases ask it."""
+    for module in (bakes, meshes, searches, shadows):
+        if launch := getattr(module, name, None):
+            monkeypatch.setattr(module, name, lambda *work, launch=launch, **options: spoil(launch(*work, **options)))
+
+
 @pytest.mark.parametrize("kernel", [pytest.param(k, marks=[pytest.mark.slow] if k in LONG else []) for k in BROKEN])
 def test_a_broken_kernel_is_found_out(kernel, monkeypatch):
     name, spoil = BROKEN[kernel]
-    launch = getattr(hard_kernels, name)
-    monkeypatch.setattr(hard_kernels, name, lambda *work, **options: spoil(launch(*work, **options)))
+    spoil_all(monkeypatch, name, spoil)
     (row,) = run_hard_cases(["cpu"], kernels=[kernel])
     assert row.wrong
 
 
 def test_every_kernel_can_be_found_out():
-    assert set(BROKEN) == set(hard_kernels.KERNELS)
+    assert set(BROKEN) == set(KERNELS)
 
 
 @pytest.fixture
 def only_stab(monkeypatch):
     """One kernel, so that the command is quick."""
-    monkeypatch.setattr(hard_cases, "KERNELS", {"launch_stab": hard_kernels.KERNELS["launch_stab"]})
+    monkeypatch.setattr(hard_cases, "KERNELS", {"launch_stab": KERNELS["launch_stab"]})
 
 
 def test_command(only_stab, capsys):
@@ -293,8 +301,7 @@ def test_command(only_stab, capsys):
 
 
 def test_command_exits_1_on_a_wrong_kernel(only_stab, monkeypatch, capsys):
-    launch = hard_kernels.launch_stab
-    monkeypatch.setattr(hard_kernels, "launch_stab", lambda *work, **options: hide_all(launch(*work, **options)))
+    spoil_all(monkeypatch, "launch_stab", hide_all)
     assert main(["verify", "--hard-cases"]) == 1
     assert "wrong: launch_stab on cpu: facing windows" in capsys.readouterr().out
 

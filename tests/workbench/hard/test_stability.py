@@ -13,8 +13,7 @@ from viewcell.kernels.target import launch_target_search
 from viewcell.verify.cases.hard_cases import faces
 from viewcell.verify.exact.region import box_faces, region_visible
 from viewcell.workbench.cli import main
-from viewcell.workbench.hard import kernels as hard_kernels
-from viewcell.workbench.hard import stability
+from viewcell.workbench.hard import searches, stability
 from viewcell.workbench.hard.stability import FLOAT32, edge_case, measure_stability, slit_case, stab_case, thin_case
 
 
@@ -75,7 +74,7 @@ def test_a_broken_kernel_is_seen(monkeypatch):
         found = launch_target_search(*arguments, **options)
         return replace(found, verdict=np.zeros_like(found.verdict))
 
-    monkeypatch.setattr(hard_kernels, "launch_target_search", hiding)
+    monkeypatch.setattr(searches, "launch_target_search", hiding)
     rows = measure_stability(cases=4)
     assert all(row.wrong for row in rows if row.kernel == "launch_target_search")
 

@@ -295,10 +295,10 @@ def test_refuses_paths_that_lead_nowhere(text, said, tmp_path):
 def test_interrupted_tuning_leaves_nothing(office, tmp_path, monkeypatch):
     out = tmp_path / "out"
 
-    def interrupt(*_):
+    def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("viewcell.workbench.tune.plots.lod_page", interrupt)
+    monkeypatch.setattr("viewcell.workbench.tune.lod.html_page", interrupt)
     assert main(["tune", "lod", str(office / "office.bake"), *FAST, "--out", str(out)]) == 130
     assert not list(out.iterdir())
 

@@ -11,7 +11,7 @@ from viewcell.workbench.bake.settings_file import read_settings
 from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
 from viewcell.workbench.tune import points as tune_points
-from viewcell.workbench.tune.page import Candidate, pareto_front
+from viewcell.workbench.tune.candidates import Candidate, front_of
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def test_a_bare_graph_has_no_occluders(graph, tmp_path, capsys):
 
 def test_the_front_is_what_nothing_beats():
     points = [(1.0, 5.0), (2.0, 5.0), (2.0, 3.0), (3.0, 4.0), (4.0, 1.0), (4.0, 2.0)]
-    front = pareto_front([Candidate("", "", *point) for point in points])
+    front = front_of([Candidate("", "", *point) for point in points])
     assert [(c.time, c.error) for c in front] == [(1.0, 5.0), (2.0, 3.0), (4.0, 1.0)]
 
 

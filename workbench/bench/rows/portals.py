@@ -6,6 +6,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import linprog
 
 from ....data.errors import InputError
 from ....data.graph import OTHER_AXES, CellGraph
@@ -18,10 +19,11 @@ from ....kernels.stab_batch import StabAnswers, launch_stab
 from ....kernels.target import TargetAnswers, launch_target_search
 from ....solvers.visibility.graph_engine import GraphEngine
 from ....verify.exact.stab import stab
-from ..stab import margin_by_scipy, sequences
 from ..suite import Case, Errors
 
 BOXES, JUDGED_LISTS, LP_LISTS = 8, 200, 20
+# How far beside its line a portal may begin [grid steps], so that about half of the lists are stabbed.
+MISSES = 200
 # Rooms of 4 m by 4 m by 3 m [grid steps].
 ROOM = np.array([4096, 4096, 3072])
 # Stabbing decisions a source and octant of the plain search: in halls it stops there, without all answers.
@@ -33,9 +35,42 @@ OCTANTS = tuple(product((1, -1), repeat=3))
 HALF = tuple(i for i in range(8) if i % 2 == 0)
 
 
+def sequences(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Portals beside points of oblique lines in octant +++: boxes (count, BOXES, 2, 3) and signs (count, 3)."""
+    rng = np.random.default_rng(seed)
+    speed = rng.integers(200, 2000, (count, 1, 3))
+    steps = np.cumsum(rng.integers(1, 8, (count, BOXES)), axis=1)
+    touch = steps[:, :, None] * speed
+    low = touch - rng.integers(-MISSES, 1000, (count, BOXES, 3))
+    high = low + rng.integers(500, 2500, (count, BOXES, 3))
+    axis = rng.integers(0, 3, (count, BOXES))[:, :, None] == np.arange(3)
+    low, high = np.where(axis, touch, low), np.where(axis, touch, high)
+    return np.stack([low, high], axis=2).astype(np.int32), np.ones((count, 3), np.int32)
+
+
+def programme(boxes: np.ndarray) -> tuple[np.ndarray, list[tuple[float, float]]]:
+    """Rows A x <= 0 and bounds: w_i lo_i - xi_i + t <= w_j hi_j - xi_j for all boxes and i != j, w >= 1, t <= 1."""
+    rows = np.zeros((6 * len(boxes), 7))
+    at = 0
+    for low, high in boxes.astype(float):
+        for i in range(3):
+            for j in range(3):
+                if i != j:
+                    rows[at, [i, j, 3 + i, 3 + j, 6]] = low[i], -high[j], -1.0, 1.0, 1.0
+                    at += 1
+    return rows, [(1.0, np.inf)] * 3 + [(-np.inf, np.inf)] * 2 + [(0.0, 0.0), (-np.inf, 1.0)]
+
+
+def margin_by_scipy(boxes: np.ndarray) -> float:
+    """Largest t, by HiGHS through SciPy."""
+    rows, bounds = programme(boxes)
+    cost = np.array([0.0] * 6 + [-1.0])
+    return -linprog(cost, A_ub=rows, b_ub=np.zeros(len(rows)), bounds=bounds, method="highs").fun
+
+
 def stab_cases(n: int, device: Device) -> list[Case]:
     """One octant for n lists of boxes; the truth is the exact twin's."""
-    boxes, signs = sequences(n, BOXES, seed=BOXES)
+    boxes, signs = sequences(n, seed=BOXES)
     few = boxes[:LP_LISTS]
     return [
         Case(

@@ -1,30 +1,18 @@
-"""Pictures of a tuning: time against error, switches, frame times; and a page that holds them and the table."""
-
-import base64
-import html
-import io
-from typing import TYPE_CHECKING
+"""Picture of a tuning of levels: time against error, switches, frame times."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-if TYPE_CHECKING:
-    from .lod import Tuning
+from ..pages import COLOURS, MARKERS, png
+from .outcomes import Tuning
 
-# Colours that colour-blind readers tell apart (Okabe and Ito).
-COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#cc79a7", "#555555")
-MARKERS = ("o", "s", "^", "D", "P")
 # What loses less [%] is drawn here: a logarithmic axis has no zero.
 FLOOR_PERCENT = 1.0e-5
-STYLE = (
-    "body{font:15px/1.5 sans-serif;max-width:75em;margin:2em auto;padding:0 1em}img{max-width:100%}"
-    "table{border-collapse:collapse;font-size:13px}td,th{border:1px solid #ccc;padding:.2em .6em;text-align:right}"
-)
 
 
-def lod_plot(tuning: "Tuning", name: str) -> bytes:
+def lod_plot(tuning: Tuning, name: str) -> bytes:
     """PNG: for each budget time against error; switches of all settings; frame times along the path."""
     count = len(tuning.budgets_ms)
     figure = Figure(figsize=(max(11.0, 4.4 * count), 9.0), layout="constrained")
@@ -47,16 +35,14 @@ def lod_plot(tuning: "Tuning", name: str) -> bytes:
     left, right = bottom.subplots(1, 2)
     _switches(left, tuning, methods)
     _frame_times(right, tuning)
-    out = io.BytesIO()
-    figure.savefig(out, dpi=110, format="png")
-    return out.getvalue()
+    return png(figure)
 
 
 def _with(coherent: bool) -> str:
     return " with coherence" if coherent else " without coherence"
 
 
-def _scatter(axes: Axes, tuning: "Tuning", methods: list[str], budget: float) -> None:
+def _scatter(axes: Axes, tuning: Tuning, methods: list[str], budget: float) -> None:
     for o in tuning.outcomes:
         if o.budget_ms == budget:
             k = methods.index(o.method)
@@ -69,7 +55,7 @@ def _scatter(axes: Axes, tuning: "Tuning", methods: list[str], budget: float) ->
     axes.grid(True, which="major", alpha=0.3)
 
 
-def _switches(axes: Axes, tuning: "Tuning", methods: list[str]) -> None:
+def _switches(axes: Axes, tuning: Tuning, methods: list[str]) -> None:
     """Bars by method, means over the budgets."""
     shown = [m for m in methods if any(o.method == m and o.coherent for o in tuning.outcomes)]
     for shift, coherent in ((-0.2, False), (0.2, True)):
@@ -81,11 +67,11 @@ def _switches(axes: Axes, tuning: "Tuning", methods: list[str]) -> None:
         bars = axes.bar(np.arange(len(shown)) + shift, mean, 0.36, facecolor=face, edgecolor=colours, linewidth=1.5)
         axes.bar_label(bars, fmt="%.1f", fontsize=8)
     axes.set_xticks(np.arange(len(shown)), [m.replace(", ", ",\n").replace(" greedy", "\ngreedy") for m in shown])
-    axes.set_ylabel("objects a frame that change level")
+    axes.set_ylabel("objects per frame that change level")
     axes.set_title("flicker: without coherence (hollow) and with (filled)", fontsize=10)
 
 
-def _frame_times(axes: Axes, tuning: "Tuning") -> None:
+def _frame_times(axes: Axes, tuning: Tuning) -> None:
     """Modelled frame times along the path."""
     for (name, times), colour in zip(tuning.modelled_ms.items(), ("#999999", COLOURS[0]), strict=False):
         axes.plot(times, color=colour, linewidth=1.3, label=name)
@@ -94,19 +80,3 @@ def _frame_times(axes: Axes, tuning: "Tuning") -> None:
     axes.set(xlabel="frame of the path", ylabel="modelled frame time [ms]", ylim=(0, None))
     axes.set_title(f"frame time, {tuning.cost.renderer}", fontsize=10)
     axes.legend(fontsize=8, frameon=False)
-
-
-def lod_page(tuning: "Tuning", name: str, picture: bytes) -> str:
-    """HTML in one file: reason, picture, table, and how the costs were found."""
-    head, rows = tuning.rows()
-    cells = "".join(f"<th>{html.escape(text)}</th>" for text in head)
-    body = "".join("<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in row) + "</tr>" for row in rows)
-    said = "".join(f"<p>{html.escape(text)}</p>" for text in (tuning.cost.line(), *tuning.notes))
-    title = html.escape(f"Choosing levels of detail in {name}")
-    image = base64.b64encode(picture).decode()
-    return (
-        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
-        f"</head><body><h1>{title}</h1><p>{html.escape(tuning.reason)}</p>"
-        f'<img alt="time against error" src="data:image/png;base64,{image}">'
-        f"<table><tr>{cells}</tr>{body}</table>{said}</body></html>\n"
-    )

@@ -1,12 +1,10 @@
-"""Curves of time against error: every knob of every method swept over some view cells of a bake.
+"""Sweeping every knob of every method over some view cells of a bake.
 
 Error is potential / seen, where seen is what any of the runs has a witness for or any ray hits: the true overestimate
 is at most that. Sampling alone is the exception that the picture is for: it is fast and hides what is visible, so its
 ratio falls below 1.
 """
 
-import io
-import json
 import tempfile
 import time
 from collections.abc import Iterator
@@ -18,20 +16,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from tqdm import tqdm
 
-from ..data.errors import InputError
-from ..data.store.view_cells import write_view_cells
-from ..verify.rays.witness import visible_rows, witnessed_objects
-from .bake.run import bake
-from .bake.settings import Settings
-from .files import write_files
-from .summary import table
-from .tune.plots import COLOURS, MARKERS
-from .verify import seen_by_rays
+from ...data.errors import InputError
+from ...data.store.view_cells import write_view_cells
+from ...verify.rays.witness import visible_rows, witnessed_objects
+from ..bake.run import bake
+from ..bake.settings import Settings
+from ..verify import seen_by_rays
+from .series import LEVELS, SAMPLING, Curves, Point, Series
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from ..data.store.bake_folder import BakeFolder
+    from ...data.store.bake_folder import BakeFolder
 
 THRESHOLDS_M2 = (0.0, 1.0, 4.0)
 SPLITS = (1, 2)
@@ -43,67 +37,7 @@ RESOLUTIONS = (64, 128, 256, 512, 1024)
 CLUSTERS = (1, 6, 14, 26)
 RAYS = (1_000, 10_000, 100_000, 1_000_000)
 GRAPH_RAYS = (10, 100, 1_000, 10_000)
-SAMPLING, LEVELS = "sampling alone", "levels of detail"
-# Drawn instead of 0.
-EXACT = 1e-4
 PIXELS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
-
-
-@dataclass(frozen=True)
-class Point:
-    """One setting of one knob.
-
-    Attributes:
-        value: of the knob.
-        seconds: of visibility, for all view cells, preparation apart (of sampling: all in all); NaN where time is not
-            what it trades.
-        error: potential / seen; of the knob pixels the share of triangles that is drawn.
-        unknown: share of the potential pairs without a witness, or NaN.
-        wrong_hidden: pairs hidden although seen.
-    """
-
-    value: float
-    seconds: float
-    error: float
-    unknown: float
-    wrong_hidden: int
-
-
-@dataclass(frozen=True)
-class Series:
-    """A method whose knob is swept; see `Point`.
-
-    Attributes:
-        method: in words.
-        knob: with its unit.
-        points: in the order they were run.
-        apart: of other view cells than the rest, and so not to be compared with it point by point.
-    """
-
-    method: str
-    knob: str
-    points: list[Point]
-    apart: bool = False
-
-
-@dataclass(frozen=True)
-class Curves:
-    """All series of a scene.
-
-    Attributes:
-        scene: its name and size.
-        series: of the methods.
-        pairs: seen pairs that errors are relative to.
-    """
-
-    scene: str
-    series: list[Series]
-    pairs: int
-
-    @property
-    def safe(self) -> list[Series]:
-        """Those of methods that hide nothing visible, unless they are broken."""
-        return [one for one in self.series if one.method not in (SAMPLING, LEVELS)]
 
 
 @dataclass
@@ -208,8 +142,8 @@ class _Sweeper:
 
     def pixel_series(self) -> Series | None:
         """Share of the triangles that is drawn as the limit on the image's deviation grows."""
-        from ..data.lod import object_errors
-        from ..solvers.levels.pixel_error import PixelLimit, pixel_levels
+        from ...data.lod import object_errors
+        from ...solvers.levels.pixel_error import PixelLimit, pixel_levels
 
         scene, points = self._scene, []
         shapes = [[len(mesh.faces) for mesh in scene.definitions[o.definition_id].lods] for o in scene.objects]
@@ -240,7 +174,7 @@ class _Sweeper:
 
     def _split(self, method: str, parts: int) -> _Run:
         """View cells cut in parts on each axis; a cell sees what a part sees."""
-        from ..solvers.visibility.projection import split_cell
+        from ...solvers.visibility.projection import split_cell
 
         boxes = [split_cell(box, parts) for box in self._boxes]
         made = self._bake(np.concatenate(boxes), Settings(method="occluders"))
@@ -290,137 +224,3 @@ def _seen_cells(made: "BakeFolder") -> np.ndarray:
     rows, out = visible_rows(made.cell_to_cell), np.zeros_like(made.potential_cells)
     out[rows["cell_id"].to_numpy(), rows["reached_cell_id"].to_numpy()] = True
     return out
-
-
-def read_curves(path: str | Path) -> Curves:
-    """Curves that `write_curves` has written.
-
-    Raises:
-        InputError: the file is unreadable or holds something else.
-    """
-    try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
-        series = [
-            Series(
-                one["method"],
-                one["knob"],
-                [Point(**{name: _number(value) for name, value in point.items()}) for point in one["points"]],
-                bool(one["apart"]),
-            )
-            for one in found["series"]
-        ]
-        return Curves(str(found["scene"]), series, int(found["pairs"]))
-    except OSError as error:
-        raise InputError(f"{path}: expected curves, found {error.strerror}") from None
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: expected curves that report has written, found {type(error).__name__}") from None
-
-
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else value
-
-
-def write_curves(curves: Curves, folder: Path) -> None:
-    """Write curves.json and curves.png into a folder, both or none.
-
-    Raises:
-        InputError: the folder cannot be written.
-    """
-    text = json.dumps(_content(curves), indent=1) + "\n"
-    write_files(folder, lambda: {"curves.png": curves_plot(curves), "curves.json": text.encode()})
-
-
-def _content(curves: Curves) -> dict:
-    """What curves.json says."""
-    content = {"scene": curves.scene, "pairs": curves.pairs, "series": [asdict(one) for one in curves.series]}
-    for one in content["series"]:
-        for point in one["points"]:
-            for name in ("seconds", "unknown"):
-                # NaN is no JSON.
-                point[name] = None if np.isnan(point[name]) else point[name]
-    return content
-
-
-def curve_lines(curves: Curves) -> str:
-    """All points for people, those of the Pareto front marked."""
-    front = pareto_points(curves.safe)
-    rows = []
-    for one in curves.series:
-        for point in one.points:
-            error = f"{100 * point.error:.1f} % drawn" if one.method == LEVELS else f"{point.error:.3f}"
-            seconds = "" if np.isnan(point.seconds) else f"{point.seconds:.3f}"
-            name = f"{one.method}, {one.knob}" + (" *" if point in front else "")
-            rows.append((name, f"{point.value:g}", seconds, error, point.wrong_hidden))
-    head = (
-        f"{curves.scene} (* none is both faster and tighter)",
-        "knob",
-        "seconds",
-        "potential / seen",
-        "hidden wrongly",
-    )
-    return table(head, rows)
-
-
-def curves_plot(curves: Curves) -> bytes:
-    """PNG: time against overestimate with the Pareto front, what sampling hides, and triangles against pixels."""
-    from matplotlib.figure import Figure
-
-    safe = curves.safe
-    sampled, drawn = ([one for one in curves.series if one.method == name] for name in (SAMPLING, LEVELS))
-    figure = Figure(figsize=(15 if drawn else 12, 6.2), layout="constrained")
-    figure.suptitle(f"Time against error. {curves.scene}", fontsize=12)
-    panels = figure.subplots(1, 3 if drawn else 2, width_ratios=[2, 1, 1] if drawn else [2, 1])
-    _draw_safe(panels[0], safe)
-    for one in sampled:
-        hidden = [100 * p.wrong_hidden / curves.pairs for p in one.points]
-        panels[1].plot([p.value for p in one.points], hidden, "X-", color=COLOURS[3])
-        for p, y in zip(one.points, hidden, strict=True):
-            panels[1].annotate(f"{p.seconds:.1f} s", (p.value, y), (5, 5), textcoords="offset points", fontsize=8)
-        panels[1].set(xscale="log", xlabel=one.knob, ylabel="seen pairs that it hides [%]", ylim=(0, None))
-    panels[1].set_title("sampling alone is not safe", fontsize=10)
-    panels[1].margins(x=0.15)
-    for one in drawn:
-        panels[2].plot([p.value for p in one.points], [100 * p.error for p in one.points], "o-", color=COLOURS[0])
-        panels[2].set(xscale="log", xlabel="deviation allowed on the image [pixels]", ylabel="triangles drawn [%]")
-        panels[2].set_title("levels of detail, 1920 x 1080", fontsize=10)
-        panels[2].set_ylim(0, None)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=4, fontsize=9, frameon=False)
-    for axes in panels:
-        axes.grid(True, which="major", alpha=0.3)
-    out = io.BytesIO()
-    figure.savefig(out, dpi=110, format="png")
-    return out.getvalue()
-
-
-def _draw_safe(axes: "Axes", series: list[Series]) -> None:
-    """Methods that hide nothing visible: one colour a method, one marker a knob."""
-    methods = list(dict.fromkeys(one.method for one in series))
-    for number, one in enumerate(series):
-        colour, marker = COLOURS[methods.index(one.method)], MARKERS[number % len(MARKERS)]
-        label = one.method if one.knob == "no knob" else f"{one.method}: {one.knob}"
-        points = sorted(one.points, key=lambda p: p.value)
-        xs, ys = [p.seconds for p in points], [_above(p) for p in points]
-        axes.plot(xs, ys, marker=marker, color=colour, linewidth=1, alpha=0.85, label=label)
-        if len(points) > 1:
-            for p in points:
-                axes.annotate(f"{p.value:g}", (p.seconds, _above(p)), (5, 4), textcoords="offset points", fontsize=7)
-    front = pareto_points(series)
-    xs, ys = [p.seconds for p in front], [_above(p) for p in front]
-    ring = {"marker": "o", "markersize": 12, "fillstyle": "none", "color": "black", "linewidth": 2}
-    axes.step(xs, ys, where="post", label="Pareto front", **ring)
-    axes.set(xscale="log", yscale="log", xlabel="seconds of visibility", ylabel="overestimate: potential / seen - 1")
-    axes.set_title("nothing visible is hidden", fontsize=10)
-
-
-def _above(point: Point) -> float:
-    """Overestimate beyond 1, for a logarithmic axis."""
-    return max(point.error - 1, EXACT)
-
-
-def pareto_points(series: list[Series]) -> list[Point]:
-    """Points that no other one beats in both time and error, fastest first."""
-    front: list[Point] = []
-    for point in sorted((p for one in series if not one.apart for p in one.points), key=lambda p: (p.seconds, p.error)):
-        if not front or point.error < front[-1].error:
-            front.append(point)
-    return front

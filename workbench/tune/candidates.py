@@ -1,8 +1,5 @@
 """What a tuning leaves: candidates with time and error, their Pareto front, and the files that show and hold them."""
 
-import base64
-import html
-import io
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -12,7 +9,7 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from ..files import write_files
-from .plots import COLOURS, MARKERS, STYLE
+from ..pages import COLOURS, MARKERS, html_page, pareto_front, png
 
 if TYPE_CHECKING:
     from ...data.store.bake_folder import BakeFolder
@@ -45,17 +42,13 @@ def default_out(bake: "BakeFolder") -> Path:
     return folder.with_name(f"{folder.name}.tune")
 
 
-def pareto_front(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Those that no other one beats in both time and error, fastest first."""
-    front: list[Candidate] = []
-    for candidate in sorted(candidates, key=lambda c: (c.time, c.error)):
-        if not front or candidate.error < front[-1].error:
-            front.append(candidate)
-    return front
+def front_of(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Their Pareto front."""
+    return pareto_front(candidates, lambda c: (c.time, c.error))
 
 
 def front_plot(candidates: Sequence[Candidate], chosen: Candidate | None, title: str, axes: tuple[str, str]) -> bytes:
-    """PNG: error against time, a colour a kind, the Pareto front as a line, the chosen one in a ring."""
+    """PNG: error against time, one colour per kind, the Pareto front as a line, the chosen one in a ring."""
     figure = Figure(figsize=(9.5, 6.0), layout="constrained")
     ax = figure.subplots()
     kinds = list(dict.fromkeys(c.kind for c in candidates))
@@ -63,7 +56,7 @@ def front_plot(candidates: Sequence[Candidate], chosen: Candidate | None, title:
         mine = [c for c in candidates if c.kind == kind]
         style = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number // len(COLOURS) % len(MARKERS)]}
         ax.plot([c.time for c in mine], [c.error for c in mine], linestyle="", markersize=8, label=kind, **style)
-    front = pareto_front(candidates)
+    front = front_of(candidates)
     ax.step([c.time for c in front], [c.error for c in front], where="post", color="black", linewidth=1, zorder=0)
     ax.plot([], [], color="black", linewidth=1, label="Pareto front")
     if chosen is not None:
@@ -77,9 +70,7 @@ def front_plot(candidates: Sequence[Candidate], chosen: Candidate | None, title:
     ax.grid(True, which="major", alpha=0.3)
     ax.set_title(title, fontsize=11)
     figure.legend(loc="outside lower center", ncols=min(5, len(kinds) + 2), fontsize=8, frameon=False)
-    out = io.BytesIO()
-    figure.savefig(out, dpi=110, format="png")
-    return out.getvalue()
+    return png(figure)
 
 
 def write_tune(
@@ -121,23 +112,8 @@ def write_tune(
     }
     files = {
         f"tune-{tuned}.png": picture,
-        f"tune-{tuned}.html": _page(title, picture, head, rows, notes).encode(),
+        f"tune-{tuned}.html": html_page(title, picture, head, rows, notes).encode(),
         f"tune-{tuned}.json": (json.dumps(content, indent=1) + "\n").encode(),
     }
     write_files(folder, lambda: files)
     return folder / f"tune-{tuned}.json"
-
-
-def _page(title: str, picture: bytes, head: Sequence[str], rows: Sequence[tuple], notes: Sequence[str]) -> str:
-    """HTML in one file."""
-    cells = "".join(f"<th>{html.escape(text)}</th>" for text in head)
-    body = "".join("<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in row) + "</tr>" for row in rows)
-    tags = ["pre" if "\n" in note else "p" for note in notes]
-    said = "".join(f"<{tag}>{html.escape(note)}</{tag}>" for tag, note in zip(tags, notes, strict=True) if note)
-    image = base64.b64encode(picture).decode()
-    return (
-        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
-        f"<style>{STYLE}</style></head><body><h1>{html.escape(title)}</h1>"
-        f'<img alt="{html.escape(title)}" src="data:image/png;base64,{image}">'
-        f"<table><tr>{cells}</tr>{body}</table>{said}</body></html>\n"
-    )

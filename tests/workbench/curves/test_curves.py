@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
-from viewcell.workbench import curves
 from viewcell.workbench.bake.run import bake
 from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
-from viewcell.workbench.curves import Point, Series, pareto_points, read_curves, sweep
+from viewcell.workbench.curves import sweep as sweeps
+from viewcell.workbench.curves.plot import write_curves
+from viewcell.workbench.curves.series import Curves, Point, Series, read_curves
+from viewcell.workbench.curves.sweep import sweep
 from viewcell.workbench.verify import seen_by_rays
 
 
@@ -24,7 +26,7 @@ def baked(tmp_path_factory):
 def quick(monkeypatch):
     small = {"THRESHOLDS_M2": (0.0,), "SPLITS": (2,), "SIDES_M": (1.0,), "SHARES": (0.2,), "RESOLUTIONS": (32,)}
     for name, values in (small | {"CLUSTERS": (1,), "RAYS": (100, 10_000), "GRAPH_RAYS": (10, 1_000)}).items():
-        monkeypatch.setattr(curves, name, values)
+        monkeypatch.setattr(sweeps, name, values)
 
 
 def test_every_knob_of_a_model_is_swept(baked, quick, tmp_path, capsys):
@@ -63,7 +65,7 @@ def test_a_bare_graph_is_swept_by_portals_and_rays(graph, quick, tmp_path):
 
 
 def test_a_method_that_hides_what_is_seen_fails(baked, quick, tmp_path, monkeypatch):
-    honest = curves.bake
+    honest = sweeps.bake
 
     def hiding(*arguments, **options):
         made = honest(*arguments, **options)
@@ -71,9 +73,9 @@ def test_a_method_that_hides_what_is_seen_fails(baked, quick, tmp_path, monkeypa
             made.__dict__["potential_objects"] = np.zeros_like(made.potential_objects)
         return made
 
-    monkeypatch.setattr(curves, "bake", hiding)
+    monkeypatch.setattr(sweeps, "bake", hiding)
     for name in ("THRESHOLDS_M2", "SPLITS", "SIDES_M", "SHARES", "CLUSTERS"):
-        monkeypatch.setattr(curves, name, ())
+        monkeypatch.setattr(sweeps, name, ())
     assert main(["curves", str(baked), "--cells", "1", "--out", str(tmp_path), "--no-progress"]) == 1
 
 
@@ -87,9 +89,9 @@ def test_rays_see_no_more_than_is_potential_and_leave_the_bake_alone(baked):
 
 def test_the_front_leaves_out_what_is_of_other_cells():
     points = [Point(1.0, seconds, error, 0.0, 0) for seconds, error in ((1, 2.0), (2, 1.5), (3, 1.6))]
-    assert pareto_points([Series("a", "k", points)]) == points[:2]
+    assert Curves("", [Series("a", "k", points)], 1).front == points[:2]
     other = Series("b", "k", [Point(1.0, 0.1, 1.0, 0.0, 0)], apart=True)
-    assert pareto_points([Series("a", "k", points), other]) == points[:2]
+    assert Curves("", [Series("a", "k", points), other], 1).front == points[:2]
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"scene": "a"}', '{"scene": "a", "pairs": 1, "series": [{}]}'])
@@ -105,4 +107,4 @@ def test_unusable_folders_are_told_in_one_line(baked, quick, tmp_path, capsys):
     assert main(["curves", str(tmp_path), "--no-progress"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     with pytest.raises(InputError, match="expected a folder"):
-        curves.write_curves(curves.Curves("a", [Series("sampling alone", "k", [])], 0), tmp_path / "file")
+        write_curves(Curves("a", [Series("sampling alone", "k", [])], 0), tmp_path / "file")

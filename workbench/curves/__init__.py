@@ -1,0 +1,1 @@
+"""Curves of time against error."""
