@@ -576,7 +576,6 @@
       if (taken.some((t) => t[0] < room[2] && room[0] < t[2] && t[1] < room[3] && room[1] < t[3])) continue;
       taken.push(room);
       pen.lineWidth = 3.5;
-      pen.lineJoin = "round";
       pen.strokeStyle = "rgba(255,255,255,.9)";
       pen.fillStyle = "#1d2329";
       lines.forEach((text, n) => {
@@ -654,6 +653,7 @@
     canvas.width = Math.round(width * ratioOf);
     canvas.height = Math.round(height * ratioOf);
     pen.setTransform(ratioOf, 0, 0, ratioOf, 0, 0);
+    pen.lineJoin = "round";
     makeHatch();
     if (first) fit();
     else paint();
