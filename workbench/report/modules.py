@@ -7,7 +7,7 @@ IMPORT = re.compile(r'^import \{([^}]*)\} from "\./([\w.-]+)";\n', re.MULTILINE)
 EXPORT = re.compile(r"^export (?=(?:async |class |const |function |let ))", re.MULTILINE)
 DECLARED = re.compile(r"^(export )?(?:async )?(?:class|const|function|let) ([$\w]+)", re.MULTILINE)
 # What the three above would misread: other imports and exports, and declarations of several names at once.
-UNREAD = re.compile(r"^(?:import|export|var|(?:const|let) (?:[^$\w]|[^\n]*,$)).*", re.MULTILINE)
+UNREAD = re.compile(r"^(?:import|export|var|(?:const|let) (?:[^$\w]|[^\n]*,$)|(?:async )?function\*).*", re.MULTILINE)
 
 
 def join_modules(folder: Traversable, first: str) -> str:
@@ -22,8 +22,8 @@ def join_modules(folder: Traversable, first: str) -> str:
             or a line is not understood.
     """
     bodies: dict[str, str] = {}
-    owners: dict[str, str] = {}
-    exported: set[tuple[str, str]] = set()
+    # Of every name at top level its module, and whether others may import it.
+    owners: dict[str, tuple[str, bool]] = {}
 
     def add(module: str, above: tuple[str, ...]) -> None:
         if module in above:
@@ -33,19 +33,17 @@ def join_modules(folder: Traversable, first: str) -> str:
         text = (folder / module).read_text("utf-8")
         for names, other in IMPORT.findall(text):
             add(other, (*above, module))
-            if missing := [n for n in re.findall(r"[^\s,][^,]*", names) if (other, n.strip()) not in exported]:
+            asked = [name.strip() for name in names.split(",") if name.strip()]
+            if missing := [name for name in asked if owners.get(name) != (other, True)]:
                 raise ValueError(f"{module}: expected exports of {other}, found {', '.join(missing)}")
         body = IMPORT.sub("", text)
         for export, name in DECLARED.findall(body):
             if name in owners:
-                raise ValueError(f"{module}: expected names of its own, found {name} of {owners[name]}")
-            owners[name] = module
-            if export:
-                exported.add((module, name))
-        body = EXPORT.sub("", body)
-        if found := UNREAD.search(body):
+                raise ValueError(f"{module}: expected names of its own, found {name} of {owners[name][0]}")
+            owners[name] = module, bool(export)
+        bodies[module] = EXPORT.sub("", body)
+        if found := UNREAD.search(bodies[module]):
             raise ValueError(f"{module}: expected one name a declaration and import {{ names }}, found {found[0]}")
-        bodies[module] = body
 
     add(first, ())
     return '"use strict";\n(() => {\n' + "\n".join(bodies.values()) + "})();\n"

@@ -62,6 +62,7 @@ def test_the_order_is_that_of_the_imports_alone(tmp_path):
         ("left.mjs", LEFT + "const { two } = {};\n", r"left\.mjs: expected .*, found const { two }"),
         ("left.mjs", LEFT + "let [two] = [];\n", r"left\.mjs: expected .*, found let \[two\]"),
         ("left.mjs", LEFT + "var two = 2;\n", r"left\.mjs: expected .*, found var two"),
+        ("left.mjs", LEFT + "export async function* two() {}\n", r"left\.mjs: expected .*, found async function\* two"),
     ],
 )
 def test_what_would_mean_something_else_is_refused(tmp_path, module, text, complaint):

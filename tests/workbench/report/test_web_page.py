@@ -122,7 +122,7 @@ def test_the_page_loads_nothing(house):
 
 
 def test_names_cannot_leave_the_data(house):
-    name = "</script><script>alert(1)</script><!-- {{data}} {{report.js}}"
+    name = "</script><script>alert(1)</script><!-- {{data}} {{script}}"
     house.scene.objects[0] = replace(house.scene.objects[0], name=name)
     house.graph.cell_names = np.array([name] * house.graph.cell_count)
     house.manifest["source"] = name
@@ -260,5 +260,6 @@ def test_the_page_is_package_data():
         "viewcell.workbench.report"
     ]
     parts = sorted(f"page/{path.name}" for path in (ROOT / "workbench" / "report" / "page").iterdir())
-    assert parts == ["page/report.css", "page/report.html", "page/report.js"]
+    modules = [part for part in parts if part.endswith(".mjs")]
+    assert "page/main.mjs" in modules and parts == sorted(["page/report.css", "page/report.html", *modules])
     assert all(any(fnmatch(part, glob) for glob in globs) for part in parts)
