@@ -23,6 +23,7 @@ from ...data.errors import InputError
 from ...data.scene import Role
 from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses
+from .modules import join_modules
 from .plans import Storey, find_storeys, plan_of, section_lines
 
 if TYPE_CHECKING:
@@ -68,13 +69,13 @@ def page(bake: "BakeFolder", title: str, curves: dict | None = None) -> str:
         title: the model's name.
         curves: what `read_curves_json` returns, if there are any.
     """
-    parts = {name: (files(__package__) / "page" / name).read_text("utf-8") for name in ("report.css", "report.js")}
-    text = (files(__package__) / "page" / "report.html").read_text("utf-8")
+    folder = files(__package__) / "page"
+    parts = {"title": html.escape(title), "script": join_modules(folder, "main.mjs")}
+    parts["style"] = (folder / "report.css").read_text("utf-8")
     data = json.dumps(page_data(bake, title, curves), separators=(",", ":"), allow_nan=False)
     # In a script element only "<" could end or open anything.
     parts["data"] = data.replace("<", "\\u003c")
-    parts["title"] = html.escape(title)
-    return re.sub(r"\{\{([\w.]+)\}\}", lambda place: parts[place[1]], text)
+    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], (folder / "report.html").read_text("utf-8"))
 
 
 def page_data(bake: "BakeFolder", title: str, curves: dict | None = None) -> dict:
@@ -84,7 +85,7 @@ def page_data(bake: "BakeFolder", title: str, curves: dict | None = None) -> dic
     of_cell = np.full(graph.cell_count, -1)
     for number, storey in enumerate(storeys):
         of_cell[storey.cells] = number
-    data = {
+    return {
         "title": title,
         "facts": _facts(bake),
         "cells": {
@@ -104,7 +105,6 @@ def page_data(bake: "BakeFolder", title: str, curves: dict | None = None) -> dic
         "objectRows": _packed_rows(table_rows(bake, "object")),
         "curves": curves,
     }
-    return data
 
 
 def read_curves_json(path: str | Path) -> dict:

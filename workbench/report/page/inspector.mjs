@@ -1,0 +1,130 @@
+// The view cell and the chosen target in words and numbers.
+import { SEEN, UNKNOWN, WORD } from "./data.mjs";
+import { $, button, make, paragraph, tableCell } from "./dom.mjs";
+import { count, describe, label, nature, ratio, size } from "./words.mjs";
+
+const VERDICT = ["HIDDEN", "UNKNOWN", "VISIBLE"];
+const REASON = [
+  "proved: no open sightline joins the view cell to it.",
+  "neither a sightline nor a proof was found; it stays in the potentially visible set.",
+  "a stored sightline, checked exactly, shows it.",
+];
+const ELSEWHERE = "Its sightline is in the bake's folder; this page holds those to the largest targets only.";
+
+/** Classes of targets that are counted apart: name, kind, which of the kind, and how many there are. */
+export function classesOf({ cells, facts, sources, cellCount, objectCount }) {
+  const ofCells = [
+    ["Inhabitable cells", "cell", (id) => cells.inhabitable[id], sources.length],
+    ["Other cells", "cell", (id) => !cells.inhabitable[id], cellCount - sources.length],
+  ];
+  const ofObjects = [["Objects", "object", () => true, objectCount]];
+  return [...(facts.claimsCells ? ofCells : []), ...(objectCount ? ofObjects : [])];
+}
+
+/** Name, whereabouts and numbers of the view cell. */
+export function showCell({ bake, cell }) {
+  const b = bake.box("cell", cell),
+    [low, high] = [b[2], b[5]].map((z) => bake.metres(z).toFixed(2));
+  $("cell-input").value = label(cell, bake.cells.names[cell]);
+  $("picker-error").hidden = true;
+  $("cell-title").textContent = describe(bake, "cell", cell);
+  $("cell-facts").textContent = `${bake.level} ${bake.cells.storey[cell]}; ${size(bake, b)}; z ${low} to ${high} m`;
+  $("cell-numbers").tBodies[0].replaceChildren(
+    ...classesOf(bake).flatMap(([name, kind, chosen, all]) => {
+      const n = bake.relations[kind].numbers(cell, chosen);
+      const texts = [count(n.potential), count(n.seen), count(n.unknown), ratio(n.over)];
+      const row = make("tr", { className: "with-bar" }, make("th", { scope: "row" }, name));
+      row.append(...texts.map((text, k) => tableCell(text, { className: k === 3 ? "strong" : "" })));
+      return [row, barRow(n, all, name)];
+    }),
+  );
+}
+
+/** Seen, unknown and hidden as parts of all targets. */
+function barRow(n, all, name) {
+  const parts = [n.seen, n.unknown, all - n.potential].map((k, i) => `${count(k)} ${["seen", "unknown", "hidden"][i]}`);
+  const words = `${name}: ${parts.join(", ")} of ${count(all)}`;
+  const strip = make("div", { className: "bar", role: "img", title: words, "aria-label": words });
+  for (const part of ["seen", "unknown"]) {
+    // A single unknown target in thousands still shows.
+    const style = `width: ${(100 * n[part]) / Math.max(1, all)}%;${n[part] ? " min-width: 4px;" : ""}`;
+    strip.append(make("span", { className: part, style }));
+  }
+  return make("tr", { className: "bar-row" }, tableCell(strip, { colSpan: 5 }));
+}
+
+/** How many targets of the coloured kind are of each verdict on each storey; of cells, the inhabitable ones. */
+export function reached({ bake, cell, layer }) {
+  const found = bake.storeys.map(() => [0, 0, 0]);
+  bake.relations[layer].each(cell, (id, verdict) => {
+    if (layer === "object" || bake.cells.inhabitable[id]) found[bake.storeyOf(layer, id)][verdict]++;
+  });
+  return found;
+}
+
+/** Targets reached on each storey, as buttons that go there. */
+export function showReach(state) {
+  const { level, storeys } = state.bake,
+    what = state.layer === "cell" ? "Inhabitable cells reached" : "Objects reached";
+  if (storeys.length < 2) return;
+  const buttons = reached(state).map((n, number) => {
+    const words = `${level} ${number}: ${count(n[SEEN])} seen${n[UNKNOWN] ? `, ${count(n[UNKNOWN])} unknown` : ""}`;
+    const chosen = { "aria-pressed": String(number === state.storey) };
+    return n[SEEN] || n[UNKNOWN] ? button(words, () => state.show(number), chosen) : "";
+  });
+  $("reach").replaceChildren(`${what}, by ${level.toLowerCase()}:`, ...buttons.filter(Boolean));
+}
+
+/** The card of the chosen target: verdict and its reason, what the target is, its sightline, and what can be done. */
+export function showTarget(state) {
+  const { bake, storey, target, verdicts } = state,
+    card = $("target");
+  card.hidden = !target;
+  card.replaceChildren();
+  if (!target) return;
+  const { kind, id } = target,
+    verdict = verdicts[kind][id],
+    level = bake.level.toLowerCase(),
+    own = bake.storeyOf(kind, id),
+    mark = make("span", { className: `mark ${WORD[verdict]}` });
+  card.append(
+    make("h3", {}, describe(bake, kind, id)),
+    paragraph("verdict", mark, make("b", {}, VERDICT[verdict]), ": ", REASON[verdict]),
+    paragraph("quiet small", `${nature(bake, kind, id)}; ${level} ${own}; box ${size(bake, bake.box(kind, id))}`),
+    ...(verdict === SEEN ? sightWords(state, target) : []),
+  );
+  const buttons = make("div");
+  if (own !== storey) buttons.append(button(`Show ${level} ${own}`, () => state.show(own)));
+  const room = kind === "cell" && bake.cells.inhabitable[id];
+  if (room) buttons.append(button("Make it the view cell", () => state.pick(id)));
+  buttons.append(button("Close", () => state.set({ target: null })));
+  card.append(buttons);
+}
+
+/** Cells that a sightline enters, each with the portal before it. */
+export function pathOf({ portals }, cell, crossed) {
+  let here = cell;
+  return crossed.map((portal) => {
+    const [low, high] = portals.cells.subarray(2 * portal, 2 * portal + 2);
+    here = low === here ? high : low;
+    return { portal, cell: here };
+  });
+}
+
+/** Where the sightline to a seen target runs. */
+function sightWords(state, target) {
+  const { bake, cell } = state,
+    sight = state.sightline(target),
+    itself = target.kind === "cell" && target.id === cell;
+  if (!sight) return [paragraph("small", itself ? "A view cell sees itself." : ELSEWHERE)];
+  const [a, b] = sight.ends,
+    at = (p) => `(${p.map((v) => bake.metres(v).toFixed(2)).join(", ")})`,
+    long = bake.metres(Math.hypot(...a.map((v, k) => b[k] - v))),
+    n = sight.portals.length;
+  const parts = [paragraph("small", `Sightline of ${long.toFixed(2)} m from ${at(a)} to ${at(b)} m.`)];
+  if (target.kind !== "cell" || !n) return parts;
+  const path = paragraph("path", `Through ${n} portal${n === 1 ? "" : "s"}: cell ${cell}`);
+  for (const { portal, cell: next } of pathOf(bake, cell, sight.portals))
+    path.append(" → ", make("b", { title: `portal ${portal}` }, `portal ${portal}`), ` → cell ${next}`);
+  return [...parts, path];
+}
