@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from ..files import write_files
 from ..pages import COLOURS, MARKERS, png
 from ..summary import table
-from .series import LEVELS, SAMPLING, Curves, Point, content
+from .series import LEVELS, SAMPLING, Curves, Point
 
 # Drawn instead of 0.
 EXACT = 1e-4
@@ -22,7 +22,7 @@ def write_curves(curves: Curves, folder: Path) -> None:
     Raises:
         InputError: the folder cannot be written.
     """
-    text = json.dumps(content(curves), indent=1) + "\n"
+    text = json.dumps(curves.content(), indent=1) + "\n"
     write_files(folder, lambda: {"curves.png": curves_plot(curves), "curves.json": text.encode()})
 
 

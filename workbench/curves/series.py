@@ -1,7 +1,8 @@
 """What a sweep finds: settings of the knob of each method with time and error, and the file that holds them."""
 
 import json
-from dataclasses import asdict, dataclass
+import math
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -70,45 +71,59 @@ class Curves:
 
     @property
     def front(self) -> list[Point]:
-        """Points of the safe ones that no other beats in both time and error, fastest first."""
-        points = (point for one in self.safe if not one.apart for point in one.points)
-        return pareto_front(points, lambda point: (point.seconds, point.error))
+        """Points that no other beats in both time and error, fastest first.
+
+        Those of a method that hides something visible at any setting take no part: it is not safe at the others either.
+        """
+        safe = (one for one in self.series if not one.apart and not any(p.wrong_hidden > 0 for p in one.points))
+        points = (p for one in safe for p in one.points if p.seconds > 0 and not np.isnan(p.error))
+        return pareto_front(points, lambda p: (p.seconds, p.error))
+
+    def content(self) -> dict:
+        """As JSON holds it, points of the front marked; what is not known is null."""
+        front, series = self.front, []
+        for one in self.series:
+            points = []
+            for point in one.points:
+                known = {name: None if np.isnan(value) else value for name, value in asdict(point).items()}
+                points.append(known | {"front": any(point is other for other in front)})
+            series.append({"method": one.method, "knob": one.knob, "points": points, "apart": one.apart})
+        return {"scene": self.scene, "pairs": self.pairs, "series": series}
+
+    @classmethod
+    def of_content(cls, found: dict) -> "Curves":
+        """Back from JSON.
+
+        Raises:
+            ValueError, KeyError, TypeError: it is something else.
+        """
+        names = [field.name for field in fields(Point)]
+        series = [
+            Series(
+                str(one["method"]),
+                str(one["knob"]),
+                [Point(**{name: _number(point[name]) for name in names}) for point in one["points"]],
+                bool(one.get("apart", False)),
+            )
+            for one in found["series"]
+        ]
+        return cls(str(found["scene"]), series, int(found.get("pairs", 0)))
 
 
 def read_curves(path: str | Path) -> Curves:
     """Curves that `write_curves` has written.
 
     Raises:
-        InputError: the file is unreadable or holds something else.
+        InputError: the file cannot be read, or holds no series of points.
     """
     try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
-        series = [
-            Series(
-                one["method"],
-                one["knob"],
-                [Point(**{name: _number(value) for name, value in point.items()}) for point in one["points"]],
-                bool(one["apart"]),
-            )
-            for one in found["series"]
-        ]
-        return Curves(str(found["scene"]), series, int(found["pairs"]))
+        return Curves.of_content(json.loads(Path(path).read_text(encoding="utf-8")))
     except OSError as error:
         raise InputError(f"{path}: expected curves, found {error.strerror}") from None
     except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: expected curves that report has written, found {type(error).__name__}") from None
+        raise InputError(f"{path}: expected a scene and series of points, found {type(error).__name__}") from None
 
 
 def _number(value: float | None) -> float:
-    return float("nan") if value is None else value
-
-
-def content(curves: Curves) -> dict:
-    """What curves.json says."""
-    content = {"scene": curves.scene, "pairs": curves.pairs, "series": [asdict(one) for one in curves.series]}
-    for one in content["series"]:
-        for point in one["points"]:
-            for name in ("seconds", "unknown"):
-                # NaN is no JSON.
-                point[name] = None if np.isnan(point[name]) else point[name]
-    return content
+    """NaN for what is not known or not finite, which JSON has no number for."""
+    return value if value is not None and math.isfinite(value) else math.nan

@@ -13,8 +13,9 @@ from ...data.prepared import PreparedModel
 from ...data.scene import OPAQUE
 from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses, visible_rows
+from ..curves.series import read_curves
 from .plans import Painter, Section, Storey, find_storeys, plan_of
-from .web_page import page, read_curves_json
+from .web_page import page
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +62,7 @@ def report(
     folder = Path(out) if out else Path(bake.folder) / "report"
     if curves is None and (folder / "curves.json").exists():
         curves = folder / "curves.json"
-    drawn = None if curves is None else read_curves_json(curves)
+    drawn = None if curves is None else read_curves(curves)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:

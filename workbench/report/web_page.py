@@ -9,17 +9,14 @@ import base64
 import gzip
 import html
 import json
-import math
 import re
 from importlib.resources import files
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 
 from ... import __version__
-from ...data.errors import InputError
 from ...data.scene import Role
 from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses
@@ -28,6 +25,7 @@ from .plans import Storey, find_storeys, plan_of, section_lines
 
 if TYPE_CHECKING:
     from ...data.store.bake_folder import BakeFolder
+    from ..curves.series import Curves
 
 # Cut surfaces are drawn to about 8 mm, coarser only where a model has more segments than the page should hold.
 DRAWN_STEPS = 8
@@ -38,7 +36,6 @@ CROSSINGS_MOST = 2_500_000
 SKIPPED_MOST = 200
 ROLES = (Role.OCCLUDER, Role.DETAIL, Role.TRANSPARENT)
 UNKNOWN, SIGHTLINE, SEEN = 0, 1, 2
-POINT_KEYS = ("value", "seconds", "error", "unknown", "wrong_hidden")
 
 
 class Rows(NamedTuple):
@@ -61,13 +58,13 @@ class Rows(NamedTuple):
     portals: np.ndarray
 
 
-def page(bake: "BakeFolder", title: str, curves: dict | None = None) -> str:
+def page(bake: "BakeFolder", title: str, curves: "Curves | None" = None) -> str:
     """The page, complete in itself.
 
     Args:
         bake: of a model with portals, of a bare cell graph, or of view cells that see objects only.
         title: the model's name.
-        curves: what `read_curves_json` returns, if there are any.
+        curves: of time against error, if there are any.
     """
     folder = files(__package__) / "page"
     parts = {"title": html.escape(title), "script": join_modules(folder, "main.mjs")}
@@ -78,7 +75,7 @@ def page(bake: "BakeFolder", title: str, curves: dict | None = None) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], (folder / "report.html").read_text("utf-8"))
 
 
-def page_data(bake: "BakeFolder", title: str, curves: dict | None = None) -> dict:
+def page_data(bake: "BakeFolder", title: str, curves: "Curves | None" = None) -> dict:
     """What the page shows, as JSON; arrays as `pack` makes them, coordinates in grid steps."""
     graph = bake.graph
     storeys = find_storeys(graph, bake.grid_m)
@@ -103,37 +100,8 @@ def page_data(bake: "BakeFolder", title: str, curves: dict | None = None) -> dic
         "storeys": _storeys(bake, storeys),
         "cellRows": _packed_rows(table_rows(bake, "cell")),
         "objectRows": _packed_rows(table_rows(bake, "object")),
-        "curves": curves,
+        "curves": None if curves is None else curves.content(),
     }
-
-
-def read_curves_json(path: str | Path) -> dict:
-    """Curves of time against error, as far as the page draws them.
-
-    Raises:
-        InputError: the file cannot be read, or holds no series of points.
-    """
-    try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
-        series = [
-            {
-                "method": str(one["method"]),
-                "knob": str(one["knob"]),
-                "points": [{key: _finite(point[key]) for key in POINT_KEYS} for point in one["points"]],
-                "apart": bool(one.get("apart", False)),
-            }
-            for one in found["series"]
-        ]
-        return {"scene": str(found["scene"]), "series": series}
-    except OSError as error:
-        raise InputError(f"{path}: expected curves, found {error.strerror}") from None
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: expected a scene and series of points, found {type(error).__name__}") from None
-
-
-def _finite(value: float | None) -> float | None:
-    """None for what is not known, which JSON has no number for."""
-    return None if value is None or not math.isfinite(value) else value
 
 
 def pack(values: np.ndarray) -> dict:

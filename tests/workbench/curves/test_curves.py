@@ -1,5 +1,7 @@
 """Curves of time against error: what is swept, what is told, and that methods that hide what is seen are found."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from viewcell.data.buildings.office import make_office
@@ -90,8 +92,28 @@ def test_rays_see_no_more_than_is_potential_and_leave_the_bake_alone(baked):
 def test_the_front_leaves_out_what_is_of_other_cells():
     points = [Point(1.0, seconds, error, 0.0, 0) for seconds, error in ((1, 2.0), (2, 1.5), (3, 1.6))]
     assert Curves("", [Series("a", "k", points)], 1).front == points[:2]
-    other = Series("b", "k", [Point(1.0, 0.1, 1.0, 0.0, 0)], apart=True)
-    assert Curves("", [Series("a", "k", points), other], 1).front == points[:2]
+    better = [Point(1.0, 0.1, 1.0, 0.0, 0)]
+    apart, unsafe = (
+        Series("b", "k", better, apart=True),
+        Series("c", "k", [replace(better[0], wrong_hidden=1), *better]),
+    )
+    timeless = Series("d", "k", [replace(better[0], seconds=np.nan), replace(better[0], error=np.nan)])
+    assert Curves("", [Series("a", "k", points), apart, unsafe, timeless], 1).front == points[:2]
+
+
+def test_the_front_is_the_same_as_by_comparing_all_with_all():
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        points = [Point(0.0, float(s), float(e), 0.0, 0) for s, e in random.integers(1, 12, (12, 2))]
+        beaten = [
+            any(
+                q.seconds <= p.seconds and q.error <= p.error and (q.seconds, q.error) != (p.seconds, p.error)
+                for q in points
+            )
+            for p in points
+        ]
+        wanted = sorted({(p.seconds, p.error) for p, worse in zip(points, beaten, strict=True) if not worse})
+        assert [(p.seconds, p.error) for p in Curves("", [Series("a", "k", points)], 1).front] == wanted
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"scene": "a"}', '{"scene": "a", "pairs": 1, "series": [{}]}'])

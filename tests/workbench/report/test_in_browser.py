@@ -6,6 +6,7 @@ import time
 import numpy as np
 import pytest
 from builders.seen_house import CURVES, views_only
+from viewcell.workbench.curves.series import Curves
 from viewcell.workbench.report.web_page import page
 
 
@@ -96,7 +97,7 @@ class Page:
 
 def test_a_browser_shows_what_is_clicked(browser, house, tmp_path):
     """The plan's colours, the numbers and the target's card follow the clicks."""
-    shown = Page(browser, house, tmp_path, CURVES)
+    shown = Page(browser, house, tmp_path, Curves.of_content(CURVES))
     cells = house.graph.cells
     assert not shown.complaints() and shown.run("return performance.getEntriesByType('resource').length") == 0
     shown.one("#portals").click()
@@ -136,7 +137,7 @@ def test_a_browser_shows_what_is_clicked(browser, house, tmp_path):
 
 
 def test_a_browser_obeys_lists_tables_and_keys(browser, house, tmp_path):
-    shown = Page(browser, house, tmp_path, CURVES)
+    shown = Page(browser, house, tmp_path, Curves.of_content(CURVES))
     from selenium.webdriver.common.keys import Keys
 
     # The worst cell is chosen first: cell 0, the only one with something unknown; another heading sorts anew.

@@ -18,9 +18,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.errors import InputError
 from viewcell.workbench.cli import main
+from viewcell.workbench.curves.series import Curves, read_curves
 from viewcell.workbench.report import web_page as report_page
 from viewcell.workbench.report.run import report
-from viewcell.workbench.report.web_page import join_segments, pack, page, read_curves_json, table_rows
+from viewcell.workbench.report.web_page import join_segments, pack, page, table_rows
 
 TABLES = {"cellRows": ("cell_to_cell", "reached_cell_id"), "objectRows": ("cell_to_object", "object_id")}
 
@@ -111,7 +112,7 @@ def test_a_page_too_large_keeps_all_verdicts_and_the_largest_sightlines(house, m
 
 
 def test_the_page_loads_nothing(house):
-    text = page(house, "house", CURVES)
+    text = page(house, "house", Curves.of_content(CURVES))
     assert text.startswith("<!DOCTYPE html>") and '<html lang="en">' in text and "<title>house" in text
     assert "default-src 'none'" in text
     assert not re.search(
@@ -197,7 +198,9 @@ def test_the_command_writes_the_page(house, tmp_path, capsys, monkeypatch):
     # Curves in the folder are shown; those that are named go before them.
     (out / "curves.json").write_text(json.dumps(CURVES))
     assert main(["report", "x", "--cells", "0", "--out", str(out)]) == 0
-    assert content((out / "report.html").read_text(encoding="utf-8"))["curves"] == CURVES
+    shown = content((out / "report.html").read_text(encoding="utf-8"))["curves"]
+    front = [point.pop("front") for one in shown["series"] for point in one["points"]]
+    assert shown.pop("pairs") == 0 and shown == CURVES and front == [True, False, True, False, False, False]
     (tmp_path / "mine.json").write_text(json.dumps(CURVES | {"scene": "mine"}))
     assert main(["report", "x", "--cells", "0", "--out", str(out), "--curves", str(tmp_path / "mine.json")]) == 0
     assert content((out / "report.html").read_text(encoding="utf-8"))["curves"]["scene"] == "mine"
@@ -232,12 +235,12 @@ def test_curves_that_are_none_are_one_line(house, tmp_path, text):
         report(house, out=tmp_path / "r", curves=file)
     assert not (tmp_path / "r").exists()
     with pytest.raises(InputError, match=r"none\.json: expected curves, found No such file"):
-        read_curves_json(tmp_path / "none.json")
+        read_curves(tmp_path / "none.json")
 
 
 def test_unknown_numbers_of_curves_are_null(tmp_path):
     (tmp_path / "c.json").write_text(json.dumps(CURVES).replace("1.25", "NaN"))
-    assert read_curves_json(tmp_path / "c.json")["series"][0]["points"][0]["error"] is None
+    assert read_curves(tmp_path / "c.json").content()["series"][0]["points"][0]["error"] is None
 
 
 def test_a_failure_leaves_nothing_half_written(house, tmp_path, monkeypatch):

@@ -22,14 +22,12 @@ export function safeSeries(series) {
     .filter((one) => one.points.length);
 }
 
-/** Points that no other one beats in both time and error, fastest first. */
-export function paretoFront(points) {
-  const front = [];
-  for (const p of [...points].sort((a, b) => a.seconds - b.seconds || a.error - b.error)) {
-    if (!front.length || p.error < front[front.length - 1].error) front.push(p);
-  }
-  return front;
-}
+/** Points of the Pareto front, which the bake's own curves mark, fastest first. */
+export const frontOf = (series) =>
+  series
+    .flatMap((one) => one.points)
+    .filter((p) => p.front)
+    .sort((a, b) => a.seconds - b.seconds);
 
 /** Round values between two powers of ten, `low` and `high`: 1, 2 and 5 of each power, 1 alone over many powers. */
 export function ticksBetween(low, high) {
@@ -60,15 +58,13 @@ export function showCurves({ scene, series }) {
     `${scene}. Each mark is one setting of a knob, whose value stands beside it; to the left is ` +
     "faster, further down is tighter. The thick black line is the Pareto front: no setting on this page is both " +
     "faster and tighter. Methods that hide something visible are left out of the picture, and listed in the table.";
-  // Series of other view cells than the rest are not to be compared with it point by point.
-  const front = paretoFront(safe.filter((one) => !one.apart).flatMap((one) => one.points));
-  $("curves").append(curvePicture(safe, front), curveTable(series, front));
+  $("curves").append(curvePicture(safe), curveTable(series));
 }
 
 const words = (x, y, text, more = {}) => shape("text", { x, y, ...more }, text);
 const rule = (x1, x2, y1, y2, stroke, more = {}) => shape("line", { x1, x2, y1, y2, stroke, ...more });
 
-function curvePicture(series, front) {
+function curvePicture(series) {
   const { width, height, left, right, top, bottom } = PLOT,
     points = series.flatMap((one) => one.points),
     seconds = points.map((p) => p.seconds),
@@ -78,14 +74,14 @@ function curvePicture(series, front) {
   const about = "Overestimate against seconds, with the Pareto front";
   const svg = shape("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": about });
   drawAxes(svg, across, up);
-  const steps = front.map((p, n) => (n ? `H${at(p)[0]}V${at(p)[1]}` : `M${at(p).join(" ")}`)).join("");
+  const steps = frontOf(series).map((p, n) => (n ? `H${at(p)[0]}V${at(p)[1]}` : `M${at(p).join(" ")}`)).join("");
   const heavy = { fill: "none", stroke: "#111", "stroke-width": 3, "stroke-opacity": 0.8 };
   svg.append(shape("path", { d: `${steps}H${right}`, ...heavy }));
   const methods = [...new Set(series.map((one) => one.method))];
   series.forEach((one, n) => {
     const colour = SERIES[methods.indexOf(one.method) % SERIES.length];
     const y = top + 16 + 34 * n;
-    svg.append(curveMarks(one, n, colour, at, front), marker(n, right + 26, y, colour));
+    svg.append(curveMarks(one, n, colour, at), marker(n, right + 26, y, colour));
     svg.append(words(right + 40, y + 4, one.method));
     if (one.knob !== "no knob") svg.append(words(right + 40, y + 19, one.knob, { class: "knob" }));
   });
@@ -96,7 +92,7 @@ function curvePicture(series, front) {
 }
 
 /** The marks of one series, joined in the order of the knob's values. */
-function curveMarks(one, n, colour, at, front) {
+function curveMarks(one, n, colour, at) {
   const points = [...one.points].sort((a, b) => a.value - b.value);
   const line = { fill: "none", stroke: colour, "stroke-width": 1.5, "stroke-opacity": 0.7 };
   const group = shape("g", { class: "values" }, shape("polyline", { points: points.map(at).join(" "), ...line }));
@@ -105,7 +101,7 @@ function curveMarks(one, n, colour, at, front) {
     const dot = marker(n, x, y, colour);
     const numbers = `${p.seconds.toPrecision(3)} s, overestimate ${p.error.toFixed(4)}`;
     dot.append(shape("title", {}, `${one.method}, ${one.knob} ${p.value}: ${numbers}`));
-    if (front.includes(p)) dot.setAttribute("class", "on-front");
+    if (p.front) dot.setAttribute("class", "on-front");
     group.append(dot);
     if (points.length > 1) group.append(words(x + 7, y - 6, String(p.value)));
   }
@@ -142,14 +138,14 @@ function drawAxes(svg, across, up) {
   );
 }
 
-function curveTable(series, front) {
+function curveTable(series) {
   const show = (v, digits = 4) => (v === null ? "" : String(Number(v.toPrecision(digits))));
   const rows = series.flatMap((one) =>
     one.points.map((p) => {
       const unknown = p.unknown === null ? "" : `${(100 * p.unknown).toFixed(2)} %`;
       const values = [show(p.value), show(p.seconds), show(p.error), unknown, show(p.wrong_hidden, 9)];
       const names = [one.method, one.knob].map((text) => tableCell(text, { className: "text" }));
-      return tableRow(...names, ...[...values, front.includes(p) ? "yes" : ""].map((text) => tableCell(text)));
+      return tableRow(...names, ...[...values, p.front ? "yes" : ""].map((text) => tableCell(text)));
     }),
   );
   const head = HEAD.map((word, n) => make("th", { scope: "col", className: n < 2 ? "text" : "" }, word));

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import { aboveOne, logAxis, paretoFront, safeSeries, ticksBetween } from "../../../../workbench/report/page/charts.mjs";
+import { aboveOne, frontOf, logAxis, safeSeries, ticksBetween } from "../../../../workbench/report/page/charts.mjs";
 
 const point = (seconds, error, more = {}) => ({ seconds, error, wrong_hidden: 0, ...more });
 
@@ -18,26 +18,10 @@ test("points without time or error are left out, and series without points", () 
   assert.equal(some.points.length, 4);
 });
 
-test("the front has what no other point beats in both, fastest first", () => {
-  const [a, b, c, d] = [point(1, 3), point(2, 2), point(3, 2), point(4, 1)];
-  assert.deepEqual(paretoFront([d, c, b, a]), [a, b, d]);
-  assert.deepEqual(paretoFront([a, point(1, 2.5), point(0.5, 4)]), [point(0.5, 4), point(1, 2.5)]);
-  assert.deepEqual(paretoFront([b, point(2, 2)]), [b]);
-  assert.deepEqual(paretoFront([]), []);
-});
-
-test("the front is the same as by comparing all with all", () => {
-  let seed = 1;
-  const random = () => (seed = (seed * 48271) % 2147483647) % 12;
-  for (let round = 0; round < 50; round++) {
-    const points = Array.from({ length: 12 }, () => point(random(), random()));
-    const beaten = (p) =>
-      points.some((q) => q.seconds <= p.seconds && q.error <= p.error && (q.seconds < p.seconds || q.error < p.error));
-    const wanted = new Set(points.filter((p) => !beaten(p)).map((p) => `${p.seconds} ${p.error}`));
-    const front = paretoFront(points).map((p) => `${p.seconds} ${p.error}`);
-    assert.deepEqual(new Set(front), wanted);
-    assert.equal(front.length, wanted.size);
-  }
+test("the front is what is marked, fastest first", () => {
+  const [a, b, c] = [point(2, 2, { front: true }), point(1, 3, { front: true }), point(3, 2, { front: false })];
+  assert.deepEqual(frontOf([{ points: [a, c] }, { points: [b] }]), [b, a]);
+  assert.deepEqual(frontOf([{ points: [c] }]), []);
 });
 
 test("ticks are round and between the ends", () => {
