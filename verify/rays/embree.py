@@ -14,7 +14,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 from ..exact.trace import Links
-from .sightings import ROUNDS, Maze, Sightings, mark_sightings
+from .sightings import ROUNDS, Maze, Rays, Sightings, mark_sightings
 
 wp.set_module_options({"enable_backward": False})
 
@@ -206,9 +206,11 @@ class Caster:
         origins, directions = self.rays(first, run)
         reach, hits = self.embree(origins, directions)
         found, count = np.zeros((CANDIDATE_CAPACITY, 4), np.int32), np.zeros(1, np.int32)
-        rays = [_share(origins, wp.vec3), _share(directions, wp.vec3), _share(reach)]
+        rays = Rays()
+        rays.origins, rays.directions = _share(origins, wp.vec3), _share(directions, wp.vec3)
+        rays.reach, rays.hits = _share(reach), _share(hits)
         rounds = [self._aims.spot_counts, first, self._crossing]
-        inputs = [self._maze, self._sources, run, *rounds, *rays, self._owners, _share(hits), self._marks]
+        inputs = [self._maze, self._sources, run, *rounds, rays, self._owners, self._marks]
         wp.launch(
             mark_sightings, len(self.sources), inputs=inputs, outputs=[_share(found), _share(count)], device="cpu"
         )

@@ -30,6 +30,16 @@ class Maze:
 
 
 @wp.struct
+class Rays:
+    """Rays in grid steps, the parameter of each hit, and its triangle or -1."""
+
+    origins: wp.array[wp.vec3]
+    directions: wp.array[wp.vec3]
+    reach: wp.array[float]
+    hits: wp.array[int]
+
+
+@wp.struct
 class Sightings:
     """Marks by row (source cell) and target, and the potentially visible set that must hold them."""
 
@@ -132,11 +142,8 @@ def mark_sightings(
     spot_counts: wp.array[int],
     first: int,
     crossing: int,
-    origins: wp.array[wp.vec3],
-    directions: wp.array[wp.vec3],
-    reach: wp.array[float],
+    rays: Rays,
     owners: wp.array[int],
-    hits: wp.array[int],
     sightings: Sightings,
     candidates_out: wp.array2d[int],
     count_out: wp.array[int],
@@ -144,18 +151,17 @@ def mark_sightings(
     """Mark the object that each ray hits and, in the `crossing` first rounds of five, the cells it enters before it.
 
     Rays come in equal runs, one per row: ray i belongs to row i // run, whose cell is sources[row]; the run's first is
-    number `first` of that row. `reach` is the hit's parameter, `hits` its triangle or -1, `owners` the object of each
-    triangle.
+    number `first` of that row. `owners` is the object of each triangle.
     """
     row = wp.tid()
     cell = sources[row]
     for ray in range(row * run, (row + 1) * run):
         end = wp.float64(wp.inf)
-        if hits[ray] >= 0:
-            end = wp.float64(reach[ray]) * BEFORE_HIT
-            seen = owners[hits[ray]]
+        if rays.hits[ray] >= 0:
+            end = wp.float64(rays.reach[ray]) * BEFORE_HIT
+            seen = owners[rays.hits[ray]]
             _mark(sightings.objects, sightings.potential_objects, row, seen, ray, 1, candidates_out, count_out)
         if ((first + ray - row * run) // spot_counts[row]) % ROUNDS < crossing:
-            o = wp.vec3d(origins[ray])
-            d = wp.vec3d(directions[ray])
+            o = wp.vec3d(rays.origins[ray])
+            d = wp.vec3d(rays.directions[ray])
             _enter_cells(maze, row, cell, ray, o, d, end, sightings, candidates_out, count_out)

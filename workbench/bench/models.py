@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import bake
 from ...data.blockers import find_blockers
 from ...data.prepared import PreparedModel
 from ...data.store.bake_folder import BakeFolder
@@ -18,6 +17,7 @@ from ...kernels.blockers import blocker_tree
 from ...kernels.launch import Device
 from ...solvers.visibility.search import search_rounds
 from ...verify.findings import Counts, VerifyResult
+from ..bake.run import bake
 from ..terminal import FAILED
 from .timing import commit, print_head, print_row
 

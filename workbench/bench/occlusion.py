@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import bake
 from ...data.buildings.office import make_office
 from ...data.errors import InputError
 from ...data.prepared import PreparedModel
@@ -29,6 +28,7 @@ from ...solvers.visibility.aim import Sights
 from ...solvers.visibility.occluders import OccluderModel, seen_objects
 from ...solvers.visibility.projection import VlodSettings, vlod_hidden
 from ...verify.rays.witness import witnessed_objects
+from ..bake.run import bake
 from ..bake.settings import Settings
 from ..verify import seen_by_rays
 from .timing import commit, print_head, print_row

@@ -14,7 +14,6 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
-from ... import bake
 from ...data.buildings.office import make_office
 from ...data.buildings.plant import make_plant
 from ...data.buildings.statistics import level_statistics
@@ -31,7 +30,9 @@ from ...solvers.visibility.projection import (
     split_cell,
     vlod_hidden,
 )
+from ..bake.run import bake
 from ..bake.settings import Settings
+from ..baked import Bake
 from ..walk.path import potential_on, walk
 from .occlusion import sample_cells
 from .timing import commit
@@ -86,82 +87,88 @@ def berkeley(folder: Path) -> dict[str, list[Line]]:
     scene = make_office(like="soda-hall")
     write_scene(scene, folder / "soda.scene")
     made = bake(scene, folder / "soda.bake")
-    graph, manifest = made.graph, made.manifest
     levels = []
     for row in level_statistics(scene):
         ours = (row.objects, row.polygons, row.minimum, round(row.mean, 2), row.maximum)
         published = PUBLISHED_LEVELS[row.level]
         levels.append(Line(f"{row.level}: objects, polygons, min, mean, max", *(_many(v) for v in (published, ours))))
-    shapes = [[len(mesh.faces) for mesh in scene.definitions[o.definition_id].lods] for o in scene.objects]
+    return {
+        "Table 1: objects and polygons by level of detail": levels,
+        "Section 2.4: the display database": _database(scene, folder),
+        "Table 2: cells": _cells(scene, made),
+        "Section 3.3: precomputation": _precomputation(made),
+        f"Tables 3 and 4: a walk of {FRAMES} frames": _frames(scene, made),
+    }
+
+
+def _sizes(scene: Scene) -> list[list[int]]:
+    """Triangles of each level of each object."""
+    return [[len(mesh.faces) for mesh in scene.definitions[o.definition_id].lods] for o in scene.objects]
+
+
+def _database(scene: Scene, folder: Path) -> list[Line]:
     flat = sum(
         12 * (len(mesh.vertices) + len(mesh.faces))
         for placed in scene.objects
         for mesh in scene.definitions[placed.definition_id].lods
     )
-    database = [
-        Line("polygons of all levels", "2,217,792", f"{sum(map(sum, shapes)):,}"),
+    note = "in memory, 12 bytes per vertex and face"
+    return [
+        Line("polygons of all levels", "2,217,792", f"{sum(map(sum, _sizes(scene))):,}"),
         Line("object instances", "14,478", f"{len(scene.objects):,}"),
         Line("unique object descriptions", "8,037", f"{len(scene.definitions):,}", "our generator shares more"),
         Line("display database, shared definitions", "21.5 MB", f"{megabytes(folder / 'soda.scene'):.1f} MB", "zstd"),
-        Line(
-            "display database, flattened", "349.5 MB", f"{flat / 1e6:.1f} MB", "in memory, 12 bytes a vertex and a face"
-        ),
+        Line("display database, flattened", "349.5 MB", f"{flat / 1e6:.1f} MB", note),
     ]
-    incidence = populate(scene, graph.cells)
-    size = {"minlength": graph.cell_count}
-    stands = graph.inhabitable
-    portals = np.bincount(graph.portal_cells.ravel(), **size)
+
+
+def _cells(scene: Scene, made: Bake) -> list[Line]:
+    graph = made.graph
+    incidence, size = populate(scene, graph.cells), {"minlength": graph.cell_count}
     whole, partly = (np.bincount(incidence.cell[incidence.whole == flag], **size) for flag in (True, False))
-    cells = [
-        Line("portals a cell, mean / max", "3.10 / 63", mean_max(portals)),
+    seen, objects = (sets[graph.inhabitable].sum(axis=1) for sets in (made.potential_cells, made.potential_objects))
+    return [
+        Line("portals per cell, mean / max", "3.10 / 63", mean_max(np.bincount(graph.portal_cells.ravel(), **size))),
         Line("objects completely inside", "4.16 / 86", mean_max(whole), "of one cell only"),
         Line("objects partially inside", "6.04 / 195", mean_max(partly)),
-        Line(
-            "cells visible", "65.28 / 652", mean_max(made.potential_cells[stands].sum(axis=1)), "from inhabitable cells"
-        ),
-        Line("objects visible", "263.10 / 3,830", mean_max(made.potential_objects[stands].sum(axis=1)), "likewise"),
+        Line("cells visible", "65.28 / 652", mean_max(seen), "from inhabitable cells"),
+        Line("objects visible", "263.10 / 3,830", mean_max(objects), "likewise"),
     ]
-    seconds, dead = manifest["seconds"], manifest.get("dead_cells", 0)
+
+
+def _precomputation(made: Bake) -> list[Line]:
+    seconds, dead = made.manifest["seconds"], made.manifest.get("dead_cells", 0)
     cut = sum(seconds.get(name, 0.0) for name in ("subdivide", "portals"))
     stored = sum(megabytes(made.folder / f"{name}.parquet") for name in ("cells", "portals"))
     sets = sum(megabytes(made.folder / f"{name}.parquet") for name in ("cell_to_cell", "cell_to_object"))
-    precomputed = [
-        Line("cells", "5,060", f"{graph.cell_count + dead:,}", f"{dead:,} of them in dead space, removed"),
-        Line("inhabitable cells", "1,889", f"{stands.sum():,}", "merged where no surface parts them"),
+    return [
+        Line("cells", "5,060", f"{made.graph.cell_count + dead:,}", f"{dead:,} of them in dead space, removed"),
+        Line("inhabitable cells", "1,889", f"{made.graph.inhabitable.sum():,}", "merged where no surface parts them"),
         Line("subdivision", "4 min 36 s", f"{cut:.1f} s", "33 MHz R3000 against two cores of today"),
         Line("visibility", "3 h 31 min", f"{seconds['flood']:.1f} s", "ours is exact and has witnesses"),
         Line("cells and portals stored", "6.9 MB", f"{stored:.2f} MB", "theirs with the objects of each cell"),
         Line("visibility stored", "9.4 MB", f"{sets:.1f} MB", "ours: every pair, a witness, a portal sequence"),
     ]
+
+
+def _frames(scene: Scene, made: Bake) -> list[Line]:
     path = walk(made, FRAMES)
     begin = time.perf_counter()
-    sets_seen, _ = potential_on(made, path)
-    found = find_sightings(scene, path, SCREEN, sets_seen)
+    seen, _ = potential_on(made, path)
+    found = find_sightings(scene, path, SCREEN, seen)
     compute = 1e3 * (time.perf_counter() - begin) / len(path)
-    finest = np.array([row[0] for row in shapes])
+    finest = np.array([levels[0] for levels in _sizes(scene)])
     objects = np.diff(found.starts)
     polygons = np.bincount(np.repeat(np.arange(len(path)), objects), finest[found.object_id], len(path)).astype(int)
-    share = 100 * polygons / finest.sum()
-    frames = [
-        Line(
-            "objects rendered, visibility",
-            "105 / 469",
-            mean_max(objects),
-            "boxes in the frustum, not cut by the portals' sides",
-        ),
+    share, note = 100 * polygons / finest.sum(), "boxes in the frustum, not cut by the portals' sides"
+    return [
+        Line("objects rendered, visibility", "105 / 469", mean_max(objects), note),
         Line("polygons rendered, visibility", "5,002 / 45,828", mean_max(polygons)),
         Line("of the model", "0.35 % / 3.23 %", f"{share.mean():.2f} % / {share.max():.2f} %"),
-        Line("compute time a frame, visibility", "18 ms / 107 ms", f"{compute:.1f} ms", "mean"),
+        Line("compute time per frame, visibility", "18 ms / 107 ms", f"{compute:.1f} ms", "mean"),
         Line("polygons rendered, detail elision", "2,534 / 6,912", NONE, "needs the frame time of a graphics card"),
         Line("swap times, resident and read sets (Tables 5, 6)", "see there", NONE, "no memory management yet"),
     ]
-    return {
-        "Table 1: objects and polygons by level of detail": levels,
-        "Section 2.4: the display database": database,
-        "Table 2: cells": cells,
-        "Section 3.3: precomputation": precomputed,
-        f"Tables 3 and 4: a walk of {len(path)} frames": frames,
-    }
 
 
 def vlod(folder: Path) -> dict[str, list[Line]]:

@@ -20,11 +20,11 @@ import pyarrow as pa
 import pyarrow.csv
 from matplotlib.figure import Figure
 
-from ... import bake
 from ...data.buildings.city import make_city
 from ...data.buildings.plant import make_plant
 from ...data.scene import Scene
 from ...data.store.graph_folder import CELL_COLUMNS
+from ..bake.run import bake
 from ..bake.settings import Settings
 from .timing import commit
 
