@@ -39,6 +39,8 @@ import warp as wp
 from ..data.errors import InputError
 from .launch import CHUNK, CPU, GPU_SLOTS, Device, Scratch, launch_slots
 
+__all__ = ["Selections", "launch_select"]
+
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 f64 = wp.float64

@@ -32,6 +32,8 @@ from ..kernels.shrink import LEAST_HEIGHT, launch_shrink
 from ..kernels.umbra import USABLE, Umbras
 from .result import Result, Status
 
+__all__ = ["Problem", "cluster_problems", "in_front", "lowest_points", "solve_points"]
+
 # Limits of the interior point method, in units of the cell's diagonal and of the largest coefficient.
 ITERATIONS = 60
 TOLERANCE = 1e-10

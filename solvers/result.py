@@ -9,6 +9,8 @@ from enum import IntEnum
 
 import numpy as np
 
+__all__ = ["ADVICE", "Result", "Status"]
+
 
 class Status(IntEnum):
     """How a problem ended."""

@@ -27,6 +27,18 @@ from ..data.opaque import OpaquePlanes
 from ..data.portals import find_portals
 from ..data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene, Space
 
+__all__ = [
+    "Building",
+    "Door",
+    "Knapsack",
+    "OccludedPair",
+    "PortalSequence",
+    "buildings",
+    "knapsacks",
+    "occluded_pairs",
+    "portal_sequences",
+]
+
 try:
     from hypothesis import strategies as st
 except ImportError as error:

@@ -29,6 +29,17 @@ from ...kernels.umbra import USABLE, Umbras, launch_umbra
 from ..projection_point import cluster_problems, solve_points
 from ..result import Status
 
+__all__ = [
+    "ShrunkOccluders",
+    "VlodSettings",
+    "VlodStats",
+    "cluster_directions",
+    "culling_scores",
+    "shrunk_occluders",
+    "split_cell",
+    "vlod_hidden",
+]
+
 CLUSTERS = (1, 6, 14, 26)
 OBJECTIVES = ("centre", "random", "socp", "lp")
 # From programmes (solvers/projection_point.py) to points.

@@ -13,6 +13,8 @@ import numpy as np
 from ...data.errors import InputError
 from ..arithmetic import cross, dot, fractions, minus
 
+__all__ = ["cover_polygon", "direction"]
+
 Point = Sequence[Fraction]
 # Depth of each pixel, by row; None where the pixel is open, or not touched.
 Image = list[list[Fraction | None]]

@@ -20,6 +20,8 @@ import numpy as np
 from ...data.errors import InputError
 from ..arithmetic import dot
 
+__all__ = ["Optimality", "Programme", "lower_bound", "optimality", "relative_gap"]
+
 Point = list[Fraction]
 
 

@@ -29,6 +29,8 @@ from ...data.verdict import Verdict
 from ..arithmetic import along, cross, dot, minus
 from .matrix_game import play
 
+__all__ = ["RegionAnswer", "box_faces", "cell_faces", "region_visible", "segment_clear"]
+
 Rational = int | float | Fraction
 Point = list[Fraction]
 # A point x, y, z, w > 0, or a plane h . x + h3 w = 0 with positive side h . x > 0.

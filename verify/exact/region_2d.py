@@ -17,6 +17,8 @@ from ...data.verdict import Verdict
 from .matrix_game import play
 from .region import Point, Rational, RegionAnswer
 
+__all__ = ["cell_corners", "region_visible_2d"]
+
 # A point x, y, w > 0, or a line whose product with a point is positive to its left.
 Homogeneous = tuple[int, int, int]
 Segment = list[Homogeneous]

@@ -16,6 +16,8 @@ import numpy as np
 
 from ...data.errors import InputError
 
+__all__ = ["Selection", "best_by_milp", "best_by_table", "upper_bound"]
+
 Number = int | float | Fraction
 
 

@@ -5,6 +5,8 @@ from fractions import Fraction
 from ..arithmetic import Vector, clip, dot
 from .umbra import Occluder
 
+__all__ = ["shrunk"]
+
 
 def shrunk(o: Occluder, v: Vector, depth: Fraction | None = None) -> list[list[Fraction]]:
     """The part of the outline for which all that lies behind it, seen from v, is in the umbra.

@@ -23,6 +23,8 @@ from ...data.errors import InputError
 from ...data.verdict import Verdict
 from ..proofs.stab import Arc, Certificate
 
+__all__ = ["Stab", "stab", "stab_closed"]
+
 Ray = tuple[int, int, int]
 CYCLES = ((0, 1), (1, 2), (0, 2), (0, 1, 2), (0, 2, 1))
 AXIS_RAYS: tuple[Ray, ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))

@@ -17,6 +17,8 @@ from itertools import combinations
 
 from ..arithmetic import Vector, along, box_corners, cross, dot, minus, rational
 
+__all__ = ["Occluder", "hides", "lowest_height", "occluder", "recession", "supporting_planes", "umbra", "winds"]
+
 
 @dataclass(frozen=True)
 class Occluder:

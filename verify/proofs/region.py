@@ -18,6 +18,8 @@ from fractions import Fraction
 
 from ..arithmetic import clip, cross, dot, minus, rational
 
+__all__ = ["holds"]
+
 Points = Sequence[Sequence[Fraction]]
 
 

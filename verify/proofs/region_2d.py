@@ -8,6 +8,8 @@ needs no occluder between a and b: occluders are clipped to what lies beyond the
 from collections.abc import Sequence
 from fractions import Fraction
 
+__all__ = ["holds_2d"]
+
 Point = Sequence[Fraction]
 Segment = Sequence[Point]
 
