@@ -12,7 +12,7 @@ from viewcell.kernels.flood import launch_flood
 from viewcell.kernels.launch import Device
 from viewcell.kernels.target import TargetAnswers, launch_target_search
 from viewcell.solvers.visibility import graph_engine
-from viewcell.solvers.visibility.cells import accept, join_cell_rows
+from viewcell.solvers.visibility.cells import accept
 from viewcell.solvers.visibility.graph_engine import GraphEngine
 from viewcell.solvers.visibility.search import segments
 from viewcell.verify.exact.sightline import Sight, Sightlines
@@ -183,26 +183,3 @@ def test_threads_and_chunks_change_nothing(monkeypatch):
     for other in (two, chunked):
         for name in one.__dataclass_fields__:
             np.testing.assert_array_equal(getattr(other, name), getattr(one, name), err_msg=name)
-
-
-def test_joined_rows_are_symmetric():
-    """What one side hides is hidden from the other too, and one witness serves both sides."""
-    graph, _ = random_buildings.random_graph(0, walls=4)
-    engine = GraphEngine(graph)
-    part = engine.visible(np.arange(graph.cell_count)).cells
-    pairs = np.column_stack([part.source, part.target])
-    others = np.flatnonzero((part.source != part.target) & part.seen)
-    hidden, unseen = pairs[others[0]].tolist(), pairs[others[-1]].tolist()
-    row = int(others[-1])
-    part.verdict[row] = Verdict.UNKNOWN
-    keep = ~(pairs == hidden).all(axis=1)
-    rows = join_cell_rows(engine.model, [part.take(keep)])
-    joined = list(zip(rows.source.tolist(), rows.target.tolist(), strict=True))
-    assert tuple(hidden) not in joined and tuple(hidden[::-1]) not in joined
-    assert len(joined) == len(pairs) - 2
-    place, back = joined.index(tuple(unseen)), int(np.flatnonzero((pairs == unseen[::-1]).all(axis=1))[0])
-    assert rows.seen[place]
-    np.testing.assert_array_equal(rows.origin[place], part.end[back])
-    np.testing.assert_array_equal(rows.end[place], part.origin[back])
-    portals = rows.portals[rows.portal_starts[place] : rows.portal_starts[place + 1]]
-    assert (graph.portal_cells[portals[0]] == unseen[0]).any() and (graph.portal_cells[portals[-1]] == unseen[1]).any()

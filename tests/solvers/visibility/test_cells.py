@@ -1,0 +1,149 @@
+"""Cell-to-cell rows: what is hidden is, witnesses are witnesses, and both sides of a pair agree."""
+
+import numpy as np
+import pytest
+from builders import random_buildings, small_house
+from viewcell.data.prepared import PreparedModel
+from viewcell.data.scene import OPAQUE
+from viewcell.data.verdict import Verdict
+from viewcell.kernels.launch import CPU
+from viewcell.solvers.visibility.aim import Sights
+from viewcell.solvers.visibility.cells import (
+    CellModel,
+    accept,
+    cell_rows,
+    certified_pairs,
+    join_cell_rows,
+    strictly_inside,
+)
+from viewcell.solvers.visibility.graph_engine import GraphEngine
+from viewcell.solvers.visibility.ledger import Ledger
+from viewcell.verify.exact.sightline import Sight, Sightlines
+
+
+@pytest.fixture(scope="module")
+def house():
+    """The small house as a cell model, and its exactly known sets."""
+    scene, graph = small_house.small_scene(), small_house.small_graph()
+    model = PreparedModel(scene)
+    sights = Sights.of(model, graph.cells, 0, CPU)
+    return CellModel(graph, model.blockers(graph), sights), scene
+
+
+@pytest.fixture(scope="module")
+def truth(tmp_path_factory):
+    return small_house.small_house(tmp_path_factory.mktemp("house")).potential_cells
+
+
+def test_reached_cells_are_those_of_the_exact_search(house, truth):
+    model, scene = house
+    sources = np.flatnonzero(model.graph.inhabitable)
+    rows = cell_rows(model, sources)
+    found = np.zeros_like(truth)
+    found[rows.source, rows.target] = True
+    np.testing.assert_array_equal(found, truth)
+    assert (np.diff(rows.source * 100 + rows.target) > 0).all(), "ordered, each pair once"
+    # The pane of glass stops no sightline; walls and desk stop every other.
+    clear = Sightlines(*scene.triangles(*OPAQUE)).check(rows.origin[rows.seen], rows.end[rows.seen])
+    assert rows.seen.all() and (clear == Sight.CLEAR).all()
+    assert strictly_inside(rows.origin, model.graph.cells[rows.source]).all()
+    assert strictly_inside(rows.end, model.graph.cells[rows.target]).all()
+
+
+def test_without_aim_the_same_is_hidden(house):
+    model, _ = house
+    sources = np.flatnonzero(model.graph.inhabitable)
+    aimed, quick = cell_rows(model, sources), cell_rows(model, sources, ())
+    np.testing.assert_array_equal(quick.source, aimed.source)
+    np.testing.assert_array_equal(quick.target, aimed.target)
+    assert not (quick.seen & ~aimed.seen).any()
+
+
+def test_certificates_hide_no_more_and_name_every_pair(house):
+    model, _ = house
+    sources = np.flatnonzero(model.graph.inhabitable)
+    ledger = Ledger()
+    certified, plain = cell_rows(model, sources, (), ledger), cell_rows(model, sources, ())
+    pairs, more = (set(zip(rows.source.tolist(), rows.target.tolist(), strict=True)) for rows in (plain, certified))
+    assert pairs <= more
+    proofs = ledger.close(np.zeros(0, bool))
+    count = model.graph.cell_count
+    for source, target in {(s, t) for s in sources.tolist() for t in range(count)} - more:
+        box = model.graph.cells[target]
+        mine = proofs.boxes[proofs.cell == source]
+        assert ((mine[:, 0] <= box[0]).all(axis=1) & (mine[:, 1] >= box[1]).all(axis=1)).any(), (source, target)
+
+
+def test_groups_of_cells_are_asked_about_first(house):
+    model, _ = house
+    ledger = Ledger()
+    pairs = certified_pairs(model, np.array([0]), ledger)
+    assert (pairs[:, 0] == 0).all() and 0 not in pairs[:, 1]
+    assert len(pairs) + 1 < model.graph.cell_count or not len(ledger.close(np.zeros(0, bool)).cell)
+
+
+@pytest.mark.parametrize(
+    ("origin", "end", "held"),
+    [
+        ((2000, 600, 500), (2700, 600, 500), True),
+        ((2560, 600, 500), (2700, 600, 500), False),
+        ((2000, 600, 500), (2560, 600, 500), False),
+        ((2000, 1800, 500), (2700, 1800, 500), False),
+        ((2000, 320, 500), (2700, 320, 500), False),
+    ],
+    ids=["through the door", "from the cell's face", "to the cell's face", "through the wall", "along the door's side"],
+)
+def test_what_is_a_witness(house, origin, end, held):
+    """From the hall, cell 0, to the doorway, cell 1."""
+    model, _ = house
+    ends = np.array([origin], float), np.array([end], float)
+    assert accept(model, np.array([0]), np.array([1]), *ends).tolist() == [held]
+
+
+def test_a_witness_starts_outside_solids():
+    """A desk stands in room 2: an eye inside it sees nothing."""
+    scene, graph = small_house.small_scene(), small_house.small_graph()
+    model = PreparedModel(scene)
+    cell = CellModel(graph, model.blockers(graph), Sights.of(model, graph.cells, 0, CPU))
+    in_desk, beside = np.array([[63, 35, 4]]) * 64.0, np.array([[63, 28, 4]]) * 64.0
+    to = np.array([[63, 20, 4]]) * 64.0
+    assert accept(
+        cell, np.array([2, 2]), np.array([2, 2]), np.concatenate([in_desk, beside]), np.repeat(to, 2, 0)
+    ).tolist() == [False, True]
+
+
+def test_a_witness_that_would_start_in_a_solid_is_not_borrowed(house):
+    """Followed back, a line must be a witness too: of two rows, one seen, the other end lies in the desk."""
+    model, _ = house
+    rows = cell_rows(model, np.array([2, 4]), ())
+    there = np.flatnonzero((rows.source == 4) & (rows.target == 2))[0]
+    back = np.flatnonzero((rows.source == 2) & (rows.target == 4))[0]
+    for end, borrowed in ((np.array([63, 35, 4]) * 64.0, False), (np.array([63, 28, 4]) * 64.0, True)):
+        rows.verdict[back] = Verdict.UNKNOWN
+        rows.show(np.array([there]), rows.origin[[there]], end[None])
+        joined = join_cell_rows(model, [rows])
+        at = np.flatnonzero((joined.source == 2) & (joined.target == 4))[0]
+        assert joined.seen[at] == borrowed
+
+
+def test_joined_rows_are_symmetric():
+    """What one side hides is hidden from the other too, and one witness serves both sides."""
+    graph, _ = random_buildings.random_graph(0, walls=4)
+    engine = GraphEngine(graph)
+    part = engine.visible(np.arange(graph.cell_count)).cells
+    pairs = np.column_stack([part.source, part.target])
+    others = np.flatnonzero((part.source != part.target) & part.seen)
+    hidden, unseen = pairs[others[0]].tolist(), pairs[others[-1]].tolist()
+    row = int(others[-1])
+    part.verdict[row] = Verdict.UNKNOWN
+    keep = ~(pairs == hidden).all(axis=1)
+    rows = join_cell_rows(engine.model, [part.take(keep)])
+    joined = list(zip(rows.source.tolist(), rows.target.tolist(), strict=True))
+    assert tuple(hidden) not in joined and tuple(hidden[::-1]) not in joined
+    assert len(joined) == len(pairs) - 2
+    place, back = joined.index(tuple(unseen)), int(np.flatnonzero((pairs == unseen[::-1]).all(axis=1))[0])
+    assert rows.seen[place]
+    np.testing.assert_array_equal(rows.origin[place], part.end[back])
+    np.testing.assert_array_equal(rows.end[place], part.origin[back])
+    portals = rows.portals[rows.portal_starts[place] : rows.portal_starts[place + 1]]
+    assert (graph.portal_cells[portals[0]] == unseen[0]).any() and (graph.portal_cells[portals[-1]] == unseen[1]).any()
