@@ -55,7 +55,7 @@ class Screen:
 
 @dataclass(frozen=True)
 class CameraPath:
-    """Eyes and directions of view, one a frame.
+    """Eyes and directions of view, one per frame.
 
     Attributes:
         eyes: [m], relative to the model's origin, shape (frames, 3), float64.

@@ -1,4 +1,4 @@
-"""A bounding volume hierarchy that kernels walk without a stack.
+"""A bounding volume hierarchy that kernels traverse without a stack.
 
 Boxes are halved at the median of their widest axis, level by level, into a perfect binary tree stored in depth-first
 order: a node's first child is the next node, and `skip` is where to go when the node is missed or done.

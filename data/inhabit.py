@@ -19,7 +19,7 @@ SMALLEST_SIDE_M = 0.3
 SMALLEST_ROOM_M3 = 5.0
 SEALED_SHARE = 0.5
 SHUT_MARGIN_M = 0.01
-# Sample points an axis when a cell's share of the rooms is estimated.
+# Sample points per axis when a cell's share of the rooms is estimated.
 SAMPLES = 4
 
 

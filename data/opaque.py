@@ -13,7 +13,7 @@ import numpy as np
 
 from .graph import OTHER_AXES
 
-# An oblique outline is followed by a staircase: at most this many steps an edge, none shorter than OBLIQUE_STEP grid
+# An oblique outline is followed by a staircase: at most this many steps per edge, none shorter than OBLIQUE_STEP grid
 # steps.
 OBLIQUE_STEPS = 12
 OBLIQUE_STEP = 64

@@ -38,7 +38,7 @@ class Regions:
         places: where each region's u, v and table begin in the three arrays below, shape (regions + 1, 3), int64.
         u: ascending raster coordinates on the lower of the other two axes, all regions one after another, int32.
         v: likewise on the higher one.
-        open_before: uncovered raster cells before (i, j), a summed-area table of len(u) x len(v) a region, int32.
+        open_before: uncovered raster cells before (i, j), a summed-area table of len(u) x len(v) per region, int32.
         boxes: rectangles inside the regions, overlapping, none able to grow [grid steps], shape (boxes, 2, 3), int32.
         region: region of each rectangle, shape (boxes,), int32.
         hierarchy: over the rectangles.

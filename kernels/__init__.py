@@ -1,1 +1,1 @@
-"""Warp kernels, one geometric idea a file; one source for CPU and GPU."""
+"""Warp kernels, one geometric idea per file; one source for CPU and GPU."""

@@ -1,6 +1,6 @@
 """Line trees: what the target search went through where it found nothing, for anybody to check again.
 
-The search of kernels/target.py is walked once more for pairs that it called hidden, and written down: the blocker of
+The search of kernels/target.py is repeated for pairs that it called hidden, and written down: the blocker of
 every node, and for every child without lines the cuts that contradict each other. There are at most three. What is
 left of the triangle of directions is a convex polygon, whose edges are cuts; the last cut empties it. Its least value
 over the polygon is at a corner, and there the two edges and the cut add up to something that is nowhere negative (the

@@ -57,11 +57,11 @@ def face_covers(maps: Maps, slot: int, size: int, levels: int, low: wp.vec3d, hi
     level = int(levels)
     i = int(0)
     j = int(0)
-    walking = bool(True)
+    going = bool(True)
     nearest = FAR
     if low[2] > f64(0.0):
         nearest = UP / low[2]
-    while walking:
+    while going:
         width = size >> level
         a = reciprocal_range(low[0], high[0], border(i, width), border(i + 1, width))
         b = reciprocal_range(low[1], high[1], border(j, width), border(j + 1, width))
@@ -82,7 +82,7 @@ def face_covers(maps: Maps, slot: int, size: int, levels: int, low: wp.vec3d, hi
                 i = i >> 1
                 j = j >> 1
             if level == levels:
-                walking = False
+                going = False
             elif (i & 1) == 0:
                 i += 1
             else:

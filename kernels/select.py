@@ -1,4 +1,4 @@
-"""Level-of-detail selection: a multiple-choice knapsack a frame, solved by a Lagrange multiplier, with a certified gap.
+"""Level-of-detail selection: a multiple-choice knapsack per frame, by a Lagrange multiplier, with a certified gap.
 
 Each object g shows exactly one of its levels; the benefits should add up to as much as possible within a budget B of
 cost (Funkhouser and Sequin 1993). A price p on cost splits the problem: object g takes a level that maximises b - p c.
@@ -102,7 +102,7 @@ class Step:
 
 @wp.struct
 class Answers:
-    """One row a frame; costs count from the cheapest set."""
+    """One row per frame; costs count from the cheapest set."""
 
     choices: wp.array2d[int]
     values: wp.array[wp.float64]

@@ -1,9 +1,9 @@
-"""The shaft test: is every segment from one box to another blocked, proved piece by piece with one occluder each?
+"""The shaft test: is every segment from one box to another blocked, proved subshaft by subshaft with one occluder each?
 
 Where no single occluder (kernels/shields.py) blocks all of the shaft, the longest side of V or X is halved and both
 halves must be blocked. Halving X joins the umbras of several occluders, halving V fuses occluders that are visible past
-each other. The middle line of a piece steers: only what it crosses can block the piece, and if it crosses nothing the
-search ends at once.
+each other. The middle line of a subshaft steers: only what it crosses can block the subshaft, and if it crosses nothing
+the search ends at once.
 
 All decisions are exact for integer boxes.
 """
@@ -22,13 +22,13 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 f64 = wp.float64
 
-# Pieces that wait for their turn. A piece is taken before its sibling, so this is the deepest halving.
+# Subshafts that wait for their turn. A subshaft is taken before its sibling, so this is the deepest halving.
 STACK = wp.constant(72)
-# A piece: low and high corners of V and X.
-PIECE = wp.constant(12)
+# A subshaft: low and high corners of V and X.
+SUBSHAFT = wp.constant(12)
 # Occluders that blocked last, tried first.
 RECENT = wp.constant(8)
-SLOT_SIZE = wp.constant(STACK * PIECE + RECENT)
+SLOT_SIZE = wp.constant(STACK * SUBSHAFT + RECENT)
 
 
 @wp.struct
@@ -52,9 +52,9 @@ class Answers:
 
 @wp.struct
 class Stack:
-    """Where a slot keeps its pieces, and the occluders that blocked last: how many, and where the next one goes."""
+    """Where a slot keeps its subshafts, and the occluders that blocked last: how many, and where the next one goes."""
 
-    pieces: int
+    subshafts: int
     recent: int
     known: int
     newest: int
@@ -62,13 +62,13 @@ class Stack:
 
 @wp.func
 def corner_at(frames: wp.array[int], at: int) -> wp.vec3d:
-    """A corner of a stored piece."""
+    """A corner of a stored subshaft."""
     return wp.vec3d(f64(frames[at]), f64(frames[at + 1]), f64(frames[at + 2]))
 
 
 @wp.func
 def piece_at(frames: wp.array[int], at: int) -> Shaft:
-    """A stored piece."""
+    """A stored subshaft."""
     out = Shaft()
     out.v_lo = corner_at(frames, at)
     out.v_hi = corner_at(frames, at + 3)
@@ -79,7 +79,7 @@ def piece_at(frames: wp.array[int], at: int) -> Shaft:
 
 @wp.func
 def store_whole(work: Shafts, row: int, at: int, frames: wp.array[int]):
-    """Store a row's shaft as the first piece."""
+    """Store a row's shaft as the first subshaft."""
     pair = work.rows[row]
     for i in range(3):
         frames[at + i] = work.lo[pair[0]][i]
@@ -99,9 +99,9 @@ def blocked_again(shields: Shields, shaft: Shaft, stack: Stack, frames: wp.array
 
 @wp.func
 def halve(smallest: wp.vec2i, at: int, frames: wp.array[int]) -> bool:
-    """Put the lower half of a piece's longest side above it, the upper one in its place; False if none is long enough.
+    """Put a subshaft's lower half above it and the upper one in its place; False if no side is long enough to halve.
 
-    A piece is taken before its sibling.
+    A subshaft is taken before its sibling.
     """
     widest = int(-1)
     length = int(0)
@@ -118,16 +118,16 @@ def halve(smallest: wp.vec2i, at: int, frames: wp.array[int]) -> bool:
     if widest < 0:
         return False
     for i in range(12):
-        frames[at + PIECE + i] = frames[at + i]
+        frames[at + SUBSHAFT + i] = frames[at + i]
     halfway = (frames[at + widest] + frames[at + widest + 3]) // 2
     frames[at + widest] = halfway
-    frames[at + PIECE + widest + 3] = halfway
+    frames[at + SUBSHAFT + widest + 3] = halfway
     return True
 
 
 @wp.func
 def write_leaf(occluder: int, spot: wp.int64, at: int, frames: wp.array[int], certificate_out: wp.array2d[int]):
-    """Write down a piece and what blocks it, if certificates are wanted."""
+    """Write down a subshaft and what blocks it, if certificates are wanted."""
     if certificate_out.shape[0] > 0:
         certificate_out[int(spot), 0] = occluder
         for i in range(12):
@@ -149,11 +149,11 @@ def _shaft(
     certificate_out: wp.array2d[int],
 ):
     stack = Stack()
-    stack.pieces = wp.tid() * SLOT_SIZE
-    stack.recent = stack.pieces + STACK * PIECE
+    stack.subshafts = wp.tid() * SLOT_SIZE
+    stack.recent = stack.subshafts + STACK * SUBSHAFT
     row = first + wp.tid()
     while row < last:
-        store_whole(work, row, stack.pieces, frames)
+        store_whole(work, row, stack.subshafts, frames)
         stack.known = 0
         stack.newest = 0
         nodes = int(0)
@@ -161,7 +161,7 @@ def _shaft(
         top = int(0)
         verdict = int(Verdict.HIDDEN)
         while top >= 0:
-            at = stack.pieces + top * PIECE
+            at = stack.subshafts + top * SUBSHAFT
             shaft = piece_at(frames, at)
             nodes += 1
             found = blocked_again(shields, shaft, stack, frames)
@@ -225,9 +225,9 @@ class ShaftAnswers:
 
     Attributes:
         verdict: `Verdict`, HIDDEN or UNKNOWN, uint8.
-        nodes: pieces looked at, int32.
-        leaves: pieces proved, int32.
-        middle: ends of the middle line of the piece that was not proved [grid steps], shape (n, 2, 3), float64; a
+        nodes: subshafts looked at, int32.
+        leaves: subshafts proved, int32.
+        middle: ends of the middle line of the subshaft that was not proved [grid steps], shape (n, 2, 3), float64; a
             direction to look for a witness in.
         certificate: of the hidden rows, if asked for: (occluder, low and high corner of V', low and high corner of X')
             per leaf, shape (sum of leaves, 13), int32. Occluder r is a region, -1 - p a patch. Empty otherwise.
@@ -259,7 +259,7 @@ def launch_shaft(
         boxes: [grid steps], shape (m, 2, 3), int32, |coordinate| <= 2**24.
         rows: (view cell, occludee) boxes, shape (n, 2), int.
         smallest: sides of V and of X that are not halved below this [grid steps].
-        cap: pieces looked at per pair before the answer is UNKNOWN.
+        cap: subshafts looked at per pair before the answer is UNKNOWN.
         certify: list the leaves of every proof.
         device: where to.
 

@@ -53,8 +53,8 @@ def _trace(
     p = origins[row]
     d = ends[row] - p
     steps = int(0)
-    walking = bool(True)
-    while walking:
+    going = bool(True)
+    while going:
         leave = f64(1.0)
         axis = int(-1)
         for i in range(3):
@@ -67,7 +67,7 @@ def _trace(
                 leave = t
                 axis = i
         if axis < 0:
-            walking = False
+            going = False
         else:
             step = crossing_portal(graph, cell, axis, d[axis] > f64(0.0), p + d * leave)
             cell = step[1]
@@ -76,7 +76,7 @@ def _trace(
             steps += 1
             if cell < 0 or steps == MAX_STEPS:
                 cell = -1
-                walking = False
+                going = False
     steps_out[row] = steps
     reached_out[row] = cell
 
@@ -101,8 +101,8 @@ def launch_trace(
         device: that holds the graph.
 
     Returns:
-        The cell that holds each end, -1 where the walk met a wall or a portal's edge; starts, shape (n + 1,), int64;
-        and the portals of row r at starts[r]:starts[r + 1], int32 (undefined where the walk failed).
+        The cell that holds each end, -1 where the line met a wall or a portal's edge; starts, shape (n + 1,), int64;
+        and the portals of row r at starts[r]:starts[r + 1], int32 (undefined where it met one).
     """
     count = len(sources)
     rays = [device.array(sources, int), *(device.array(x, wp.vec3d) for x in (origins, ends))]

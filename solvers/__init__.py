@@ -1,1 +1,1 @@
-"""Solvers, one problem a file."""
+"""Solvers, one problem per file."""

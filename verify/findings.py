@@ -54,9 +54,9 @@ class VerifyResult:
 
     Attributes:
         rays: cast; every one is checked for the object that it hits.
-        cell_rays: those that are also walked through the cells they cross.
-        rays_per_second: while casting, walking and judging; compiling and building excluded.
-        embree_rates: rays a second of this check and of Embree alone, on the same rays and threads, one pair for each
+        cell_rays: those that are also followed through the cells they cross.
+        rays_per_second: while casting, following and judging; compiling and building excluded.
+        embree_rates: rays per second of this check and of Embree alone, on the same rays and threads, one pair for each
             part of the run; none for a bare graph, which has no triangles.
         guided_rays: beyond these, that look where an omission is likeliest; none for a bare graph.
         random_rays: of the guided ones that are independent and random, for each inhabitable cell with a free point.
@@ -119,7 +119,7 @@ class VerifyResult:
             ("wrong-hidden", f"{self.wrong_hidden}" + (f" (case file {self.case})" if self.case else "")),
             ("rays, for objects / for cells", f"{self.rays:,} / {self.cell_rays:,}"),
             *([("guided rays", f"{self.guided_rays:,}")] if self.guided_rays else []),
-            ("rays a second", f"{self.rays_per_second:,.0f}{ratio}"),
+            ("rays per second", f"{self.rays_per_second:,.0f}{ratio}"),
             ("grazes", f"{self.grazes:,}"),
             ("leaks narrower than the seal", f"{self.leaks:,}"),
             ("candidate rays that the exact test stops", f"{self.blocked:,}"),

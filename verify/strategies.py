@@ -199,7 +199,7 @@ class Building:
 
     @cached_property
     def view_cells(self) -> dict[str, list]:
-        """One view cell a room [m], as a table that `viewcell.check` takes."""
+        """One view cell per room [m], as a table that `viewcell.check` takes."""
         boxes = [self.room(place) * GRID_M for place in product(*map(range, self.rooms))]
         columns = {"cell_id": list(range(len(boxes)))}
         for side, end in enumerate(("min", "max")):

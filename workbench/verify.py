@@ -237,7 +237,7 @@ def _cast_all(
 
 
 def _blocks(rows: int, total: int) -> list[list[tuple[int, int]]]:
-    """Batches (first ray, rays a row) of rays 1 to total - 1 in at most five blocks that keep all threads busy."""
+    """Batches (first ray, rays per row) of rays 1 to total - 1 in at most five blocks that keep all threads busy."""
     pieces = THREADS * RATE_BLOCKS
     pieces *= -(-(total - 1) * rows // (pieces * BATCH_RAYS))
     run = max(1, -(-(total - 1) // max(pieces, 1)))

@@ -53,7 +53,7 @@ def make_office(
         +==+==+==+==+==d====+==+==+==+==+
 
     Walls, slabs, stairs and the roof are occluders; furniture is detail, with up to five levels of detail; door leaves
-    and panes are transparent. Rooms are spaces; holes in walls and slabs are openings. About half of the doors have a
+    and panes are transparent. Rooms are spaces; doors, windows and voids are openings. About half of the doors have a
     window beside them, and some rooms a door to the next one.
 
     Args:

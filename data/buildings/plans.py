@@ -44,7 +44,7 @@ def office_plan(floors: int, rooms_per_side: int) -> Plan:
     """Two rows of offices on one corridor; a stair and a meeting room face an open-plan area half way.
 
     Raises:
-        InputError: fewer than 1 or more than 100 floors, or fewer than 1 or more than 500 rooms a side.
+        InputError: fewer than 1 or more than 100 floors, or fewer than 1 or more than 500 rooms per side.
     """
     for what, count, most in (("floors", floors, 100), ("rooms_per_side", rooms_per_side, 500)):
         if not 1 <= count <= most:

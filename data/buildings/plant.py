@@ -98,8 +98,8 @@ class _Plant(Site):
         self.define("duct", block((0.3, -0.5, -0.4), (BAY_M - 0.3, 0.5, 0.4)))
         low, high = np.array([-WALL_M / 2, 0.3, 0]), np.array([WALL_M / 2, BAY_M - 0.3, HEIGHT_M])
         walls = {"wall": (), "gate wall": PASSAGES[:1], "wall x": PASSAGES + SLEEVES, "wall y": PASSAGES + TRAYS}
-        for name, holes in walls.items():
-            boxes = [np.array([[-1, y0, z0], [1, y1, z1]]) for (y0, y1), (z0, z1) in holes]
+        for name, openings in walls.items():
+            boxes = [np.array([[-1, y0, z0], [1, y1, z1]]) for (y0, y1), (z0, z1) in openings]
             self.define(name, pierced_block(low, high, boxes))
         strips = [((0, 1), (BAY_M, 2.5)), ((1, 0), (2.5, 1)), ((1, 2.5), (2.5, BAY_M))]
         self.define("grating", *(block((*a, -0.04), (*b, 0)) for a, b in strips))

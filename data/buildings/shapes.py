@@ -36,14 +36,16 @@ def lattice_mesh(lines: tuple[np.ndarray, np.ndarray, np.ndarray], solid: np.nda
     return Mesh(vertices, np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]]).astype(np.int32))
 
 
-def pierced_block(low: np.ndarray, high: np.ndarray, holes: list[np.ndarray]) -> Mesh:
-    """A box without the boxes `holes`, each of shape (2, 3) [m]; holes must not touch at an edge or corner only."""
-    clipped = [np.clip(hole, low, high) for hole in holes]
-    lines = tuple(np.unique([low[k], high[k], *(hole[i, k] for hole in clipped for i in (0, 1))]) for k in range(3))
+def pierced_block(low: np.ndarray, high: np.ndarray, openings: list[np.ndarray]) -> Mesh:
+    """A box without the boxes `openings`, each of shape (2, 3) [m], none touching another at an edge alone."""
+    clipped = [np.clip(opening, low, high) for opening in openings]
+    lines = tuple(
+        np.unique([low[k], high[k], *(opening[i, k] for opening in clipped for i in (0, 1))]) for k in range(3)
+    )
     centres = np.stack(np.meshgrid(*[(line[1:] + line[:-1]) / 2 for line in lines], indexing="ij"), axis=-1)
     solid = np.ones(centres.shape[:3], bool)
-    for hole in clipped:
-        solid &= ~((centres > hole[0]) & (centres < hole[1])).all(axis=-1)
+    for opening in clipped:
+        solid &= ~((centres > opening[0]) & (centres < opening[1])).all(axis=-1)
     return lattice_mesh(lines, solid)
 
 

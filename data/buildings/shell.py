@@ -36,8 +36,8 @@ FILLINGS = {"door": ("IfcDoor", LEAF_M), "window": ("IfcWindow", PANE_M)}
 
 
 @dataclass(frozen=True)
-class Hole:
-    """A hole in a wall: from low to high along it, from foot to head above the floor [m].
+class Opening:
+    """An opening in a wall: from low to high along it, from foot to head above the floor [m].
 
     Attributes:
         filling: "door", "window" or nothing.
@@ -134,12 +134,12 @@ class Shell:
         self.corridors.append(corridors)
 
     def _block(
-        self, kind: str, name: str, box: np.ndarray, holes: list[np.ndarray], role: Role = Role.OCCLUDER
+        self, kind: str, name: str, box: np.ndarray, openings: list[np.ndarray], role: Role = Role.OCCLUDER
     ) -> None:
-        """One object: a box, shape (2, 3) [m], without the holes; equal blocks share a definition."""
+        """One object: a box, shape (2, 3) [m], without the openings; equal blocks share a definition."""
         low, high = box
-        relative = [hole - low for hole in holes]
-        key = (kind, role, tuple(high - low), tuple(hole.tobytes() for hole in relative))
+        relative = [opening - low for opening in openings]
+        key = (kind, role, tuple(high - low), tuple(opening.tobytes() for opening in relative))
         if key not in self._known:
             self._define(key, name, pierced_block(low - low, high - low, relative))
         self.objects.append(Instance(name, kind, self._known[key], turned(low, 0.0), role))
@@ -148,31 +148,31 @@ class Shell:
         self._known[key] = len(self.definitions)
         self.definitions.append(Definition(name, (mesh,)))
 
-    def _wall(self, name: str, box: np.ndarray, axis: int, holes: list[Hole]) -> None:
+    def _wall(self, name: str, box: np.ndarray, axis: int, openings: list[Opening]) -> None:
         """A wall along x (axis 0) or y (axis 1), its doors and its windows."""
         foot = box[1, 2] - (STOREY_M - SLAB_M)
         cut = []
-        for number, hole in enumerate(holes, start=1):
+        for number, opening in enumerate(openings, start=1):
             clear = box.copy()
-            clear[:, axis] = hole.low, hole.high
-            clear[:, 2] = foot + hole.foot, foot + hole.head
+            clear[:, axis] = opening.low, opening.high
+            clear[:, 2] = foot + opening.foot, foot + opening.head
             cut.append(clear)
-            if hole.filling:
-                self._fill(f"{hole.filling} {number} of {name}", clear, axis, hole.filling)
+            if opening.filling:
+                self._fill(f"{opening.filling} {number} of {name}", clear, axis, opening.filling)
         self.openings += cut
         self._block("IfcWall", name, box, cut)
 
-    def _fill(self, name: str, hole: np.ndarray, axis: int, filling: str) -> None:
+    def _fill(self, name: str, opening: np.ndarray, axis: int, filling: str) -> None:
         """A door leaf or a pane in the middle of a wall."""
         kind, thickness = FILLINGS[filling]
-        leaf, across = hole.copy(), 1 - axis
-        middle = hole[:, across].mean()
+        leaf, across = opening.copy(), 1 - axis
+        middle = opening[:, across].mean()
         leaf[:, across] = middle - thickness / 2, middle + thickness / 2
         self._block(kind, name, leaf, [], Role.TRANSPARENT)
         if filling == "door":
             for side, angle in ((1, (0.0, -np.pi / 2)), (-1, (np.pi, np.pi / 2))):
-                handle = np.array([0.0, 0.0, hole[0, 2] + 1.0])
-                handle[axis] = hole[0, axis] + 0.1
+                handle = np.array([0.0, 0.0, opening[0, 2] + 1.0])
+                handle[axis] = opening[0, axis] + 0.1
                 handle[across] = middle + side * thickness / 2
                 self.door_faces.append((handle, angle[axis]))
 
@@ -207,27 +207,29 @@ class Shell:
                 west = room.low[0] if number else outer[0, 0]
                 east = room.high[0] + WALL_M if number < len(row) - 1 else outer[1, 0]
                 box = np.array([[west, y[0], foot - SLAB_M], [east, y[1], ceiling]])
-                self._wall(f"{side} wall of {room.name}", box, 0, self._outer_holes(room, floor))
+                self._wall(f"{side} wall of {room.name}", box, 0, self._outer_openings(room, floor))
         for side, x in (("west", (outer[0, 0], inner[0, 0])), ("east", (inner[1, 0], outer[1, 0]))):
             for band, (south, north) in enumerate(bands):
                 box = np.array([[x[0], south, foot - SLAB_M], [x[1], north, ceiling]])
                 box[1, 1] += WALL_M if band < len(bands) - 1 else 0.0
-                holes = []
+                openings = []
                 if band % 2:
                     low, high = (south + north - DOOR_M) / 2, (south + north + DOOR_M) / 2
                     entrance = side == "west" and floor == 0
-                    holes = [Hole(low, high, filling="door") if entrance else Hole(low, high, SILL_M, filling="window")]
-                self._wall(f"{side} wall {floor + 1}.{band + 1}", box, 1, holes)
+                    openings = [
+                        Opening(low, high, filling="door") if entrance else Opening(low, high, SILL_M, filling="window")
+                    ]
+                self._wall(f"{side} wall {floor + 1}.{band + 1}", box, 1, openings)
 
-    def _outer_holes(self, room: Room, floor: int) -> list[Hole]:
+    def _outer_openings(self, room: Room, floor: int) -> list[Opening]:
         if room.kind == "stair":
             return []
-        holes = [Hole(middle - 1.0, middle + 1.0, SILL_M, HEAD_M, "window") for middle in _unit_middles(room)]
+        openings = [Opening(middle - 1.0, middle + 1.0, SILL_M, HEAD_M, "window") for middle in _unit_middles(room)]
         if room.kind == "open" and floor == 0:
             middle = _unit_middles(room)[0]
-            holes[0] = Hole(middle - DOOR_M / 2, middle + DOOR_M / 2, filling="door")
+            openings[0] = Opening(middle - DOOR_M / 2, middle + DOOR_M / 2, filling="door")
             room.doors.append(np.array([middle, room.low[1], room.low[2]]))
-        return holes
+        return openings
 
     def _inner_walls(self, floor: int) -> None:
         rows = self.rows[floor]
@@ -244,41 +246,41 @@ class Shell:
 
     def _corridor_wall(self, room: Room, side: str, south: float, east: float) -> None:
         foot, ceiling = room.low[2], room.high[2]
-        holes = self._corridor_holes(room, side)
-        for hole in holes:
-            if hole.foot == 0.0:
-                room.doors.append(np.array([(hole.low + hole.high) / 2, south + WALL_M / 2, foot]))
+        openings = self._corridor_openings(room, side)
+        for opening in openings:
+            if opening.foot == 0.0:
+                room.doors.append(np.array([(opening.low + opening.high) / 2, south + WALL_M / 2, foot]))
         box = np.array([[room.low[0], south, foot], [east, south + WALL_M, ceiling]])
-        self._wall(f"{side} wall of {room.name}", box, 0, holes)
+        self._wall(f"{side} wall of {room.name}", box, 0, openings)
 
-    def _corridor_holes(self, room: Room, side: str) -> list[Hole]:
+    def _corridor_openings(self, room: Room, side: str) -> list[Opening]:
         middles = _unit_middles(room)
         middle = (room.low[0] + room.high[0]) / 2
         if room.kind in ("open", "hall"):
             half = 1.5 if room.kind == "open" else 1.0
-            return [Hole(middle - half, middle + half)]
+            return [Opening(middle - half, middle + half)]
         if room.kind == "atrium":
             # Open up to the ceiling; above ground there is a parapet.
             foot = SILL_M if room.low[2] else 0.0
-            return [Hole(room.low[0] + 0.5, room.high[0] - 0.5, foot, STOREY_M - SLAB_M)]
+            return [Opening(room.low[0] + 0.5, room.high[0] - 0.5, foot, STOREY_M - SLAB_M)]
         if room.kind == "stair":
-            return [Hole(middle - DOOR_M / 2, middle + DOOR_M / 2, filling="door")] if side == "south" else []
-        holes = [Hole(middles[0] - 1.25, middles[0] - 0.25, filling="door")]
+            return [Opening(middle - DOOR_M / 2, middle + DOOR_M / 2, filling="door")] if side == "south" else []
+        openings = [Opening(middles[0] - 1.25, middles[0] - 0.25, filling="door")]
         for middle in middles:
             if self.rng.random() < INNER_WINDOW_SHARE:
-                holes.append(Hole(middle + 0.25, middle + 1.25, SILL_M, HEAD_M, "window"))
-        return holes
+                openings.append(Opening(middle + 0.25, middle + 1.25, SILL_M, HEAD_M, "window"))
+        return openings
 
     def _partition(self, room: Room, neighbour: Room) -> None:
         """The wall between two rooms of a row; now and then with a door."""
         box = np.array([[room.high[0], room.low[1], room.low[2]], [neighbour.low[0], room.high[1], room.high[2]]])
-        holes = []
+        openings = []
         if all(side.furnished for side in (room, neighbour)) and self.rng.random() < INNER_DOOR_SHARE:
             middle = room.low[1] + 2.0
-            holes = [Hole(middle - DOOR_M / 2, middle + DOOR_M / 2, filling="door")]
+            openings = [Opening(middle - DOOR_M / 2, middle + DOOR_M / 2, filling="door")]
             for side in (room, neighbour):
                 side.doors.append(np.array([box[:, 0].mean(), middle, room.low[2]]))
-        self._wall(f"east wall of {room.name}", box, 1, holes)
+        self._wall(f"east wall of {room.name}", box, 1, openings)
 
     def _stairs(self, floor: int) -> None:
         if floor == len(self.plan.floors) - 1:

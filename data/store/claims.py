@@ -1,7 +1,7 @@
 """Claims of any baker: which objects, or cells, may be visible from which view cells. What is not claimed is hidden.
 
-A table has one row a pair, with the columns `cell_id` and `object_id` or `reached_cell_id`; names may stand for ids. A
-bit matrix has one row a view cell, in the order of the cells' table.
+A table has one row per pair, with the columns `cell_id` and `object_id` or `reached_cell_id`; names may stand for ids.
+A bit matrix has one row per view cell, in the order of the cells' table.
 """
 
 from collections import Counter

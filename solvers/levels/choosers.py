@@ -14,7 +14,7 @@ from ...kernels.select import check_knapsacks
 def literal_greedy(
     benefits: np.ndarray, costs: np.ndarray, starts: np.ndarray, budgets: np.ndarray | int
 ) -> np.ndarray:
-    """Levels taken in descending order of benefit / cost, one an object, each if it fits.
+    """Levels taken in descending order of benefit / cost, one per object, each if it fits.
 
     Benefit and cost count from the object's cheapest level (of equals the most beneficial), which it keeps if nothing
     else is taken. A cheap level of a high ratio shuts out the dear ones of its object: 0.047 of the optimum has been

@@ -92,7 +92,7 @@ class CostModel:
         """The fit in a sentence."""
         return (
             f"cost model: {self.primitive_s * 1e9:.3g} ns a triangle, {self.pixel_s * 1e9:.3g} ns a pixel, "
-            f"{self.object_s * 1e6:.3g} us an object, {self.frame_s * 1e3:.3g} ms a frame, fitted to {self.samples} "
+            f"{self.object_s * 1e6:.3g} us per object, {self.frame_s * 1e3:.3g} ms per frame, fitted to {self.samples} "
             f"frames of {self.renderer}; relative RMS {100 * self.relative_rms:.1f} %, worst {100 * self.worst:.0f} %, "
             f"R2 {self.r2:.3f}, margin {100 * self.margin:.0f} %"
         )

@@ -57,7 +57,7 @@ class Ledger:
     def add_shafts(
         self, cell: np.ndarray, boxes: np.ndarray, answers: ShaftAnswers, pair: np.ndarray | None = None
     ) -> None:
-        """Enter the pieces of what the shaft test hid from view cells; `pair` as of `add_lines`."""
+        """Enter the leaves of what the shaft test hid from view cells; `pair` as of `add_lines`."""
         hidden = np.flatnonzero(answers.verdict == Verdict.HIDDEN)
         starts = starts_of(answers.leaves[hidden])
         none, closed = np.zeros(len(hidden) + 1, np.int64), np.ones(len(hidden), bool)

@@ -33,7 +33,7 @@ from .search import segments
 FIRST_LEVEL = 3
 # Lines tried for a node of the hierarchy, and for a piece.
 NODE_CAP, PIECE_CAP = 40, 2000
-# View cells and pieces are not halved below this, and a proof has at most so many pieces of a shaft.
+# View cells and pieces are not halved below this, and a proof has at most so many subshafts.
 SMALLEST_M = (0.0625, 0.0625)
 SHAFT_CAP = 200
 # An object with so many pieces that could not be hidden is not looked at further: they are enough to aim at.

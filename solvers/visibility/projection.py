@@ -1,9 +1,9 @@
 """What is hidden from view cells, by the occlusion method of vLOD: projection points, shrunk occluders and cube maps.
 
 For each view cell the occluders are put into clusters by direction. Each cluster gets a projection point; from there
-its occluders are shrunk (kernels/shadow.py), so that whatever they hide from the point they hide from all of the cell,
-and drawn into a cube map (kernels/coverage.py) that the occludees are tested against (kernels/occludee.py). Every step
-errs on the side of the visible.
+its occluders are shrunk (kernels/umbra.py, kernels/shrink.py), so that whatever they hide from the point they hide from
+all of the cell, and drawn into a cube map (kernels/coverage.py) that the occludees are tested against
+(kernels/occludee.py). Every step errs on the side of the visible.
 
 An eye counts only outside every solid where the occluders are sections of solids. Source: Chhugani et al. 2005, section
 5.2. Beyond the paper occluders may be shrunk for occludees within a distance, one cube map for each shell of distances.
@@ -118,7 +118,7 @@ def cluster_directions(count: int) -> np.ndarray:
 def vlod_hidden(
     cells: np.ndarray,
     occluders: Patches,
-    parts: np.ndarray,
+    pieces: np.ndarray,
     owners: np.ndarray,
     settings: VlodSettings,
     *,
@@ -131,8 +131,8 @@ def vlod_hidden(
     Args:
         cells: view cells [grid steps], shape (m, 2, 3), int32.
         occluders: outlines of opaque discs, and of sections of solids for eyes outside them (`rectangle_outlines`).
-        parts: boxes that together hold each object [grid steps], shape (p, 2, 3), int32.
-        owners: object of each part, shape (p,), int.
+        pieces: boxes that together hold each object [grid steps], shape (p, 2, 3), int32.
+        owners: object of each piece, shape (p,), int.
         settings: of the method.
         objects: how many there are; by default one more than the last owner.
         points: chooses projection points instead of `settings.objective`, to compare solvers: from the clusters'
@@ -140,27 +140,27 @@ def vlod_hidden(
         device: where to.
 
     Returns:
-        Shape (m, objects), bool: true is never wrong, false may be. An object without parts is hidden. And what was
+        Shape (m, objects), bool: true is never wrong, false may be. An object without pieces is hidden. And what was
         done.
 
     Raises:
         InputError: a shape or an owner.
     """
-    cells, parts, owners = (np.asarray(x) for x in (cells, parts, owners))
+    cells, pieces, owners = (np.asarray(x) for x in (cells, pieces, owners))
     objects = int(owners.max(initial=-1)) + 1 if objects is None else objects
-    if cells.shape[1:] != (2, 3) or parts.shape[1:] != (2, 3) or owners.shape != (len(parts),):
-        found = f"{cells.shape}, {parts.shape}, {owners.shape}"
-        raise InputError(f"cells, parts, owners: expected shapes (m, 2, 3), (p, 2, 3), (p,), found {found}")
+    if cells.shape[1:] != (2, 3) or pieces.shape[1:] != (2, 3) or owners.shape != (len(pieces),):
+        found = f"{cells.shape}, {pieces.shape}, {owners.shape}"
+        raise InputError(f"cells, pieces, owners: expected shapes (m, 2, 3), (p, 2, 3), (p,), found {found}")
     if len(owners) and not 0 <= owners.min() <= owners.max() < objects:
         raise InputError(f"owners: expected objects 0 to {objects - 1}, found {owners.min()} to {owners.max()}")
-    method = _Method(occluders, parts.astype(np.int32), settings, VlodStats(), device, points)
+    method = _Method(occluders, pieces.astype(np.int32), settings, VlodStats(), device, points)
     hidden = np.ones((len(cells), objects), bool)
     split = [split_cell(cell, settings.split) for cell in cells]
     block = max(1, BLOCK // settings.split**3)
     for first in range(0, len(cells), block):
         prepared = iter(method.prepare(np.concatenate(split[first : first + block])))
         for row in range(first, min(first + block, len(cells))):
-            seen = np.zeros(len(parts), bool)
+            seen = np.zeros(len(pieces), bool)
             for _ in split[row]:
                 seen[~seen] = ~method.hidden(next(prepared), np.flatnonzero(~seen))
             hidden[row, owners[seen]] = False
@@ -185,31 +185,31 @@ class ShrunkOccluders:
 
 
 def shrunk_occluders(
-    cell: np.ndarray, occluders: Patches, parts: np.ndarray, settings: VlodSettings, *, device: Device = CPU
+    cell: np.ndarray, occluders: Patches, pieces: np.ndarray, settings: VlodSettings, *, device: Device = CPU
 ) -> ShrunkOccluders:
     """Projection points and shrunk occluders of a view cell, to look at; arguments as of `vlod_hidden`."""
-    method = _Method(occluders, np.asarray(parts, np.int32), settings, VlodStats(), device)
+    method = _Method(occluders, np.asarray(pieces, np.int32), settings, VlodStats(), device)
     view = method.prepare(np.asarray(cell)[None])[0]
     return method.shrink(view, None)
 
 
 def culling_scores(
-    cell: np.ndarray, occluders: Patches, parts: np.ndarray, weights: np.ndarray, settings: VlodSettings
+    cell: np.ndarray, occluders: Patches, pieces: np.ndarray, weights: np.ndarray, settings: VlodSettings
 ) -> list[Callable[[np.ndarray], float]]:
-    """For each cluster of a view cell: weight of the parts that its occluders hide, as a function of the point.
+    """For each cluster of a view cell: weight of the pieces that its occluders hide, as a function of the point.
 
     This is what projection points are chosen for and what their programmes stand in for; a step function.
 
     Args:
         cell: one view cell [grid steps], shape (2, 3), int32.
         occluders: as of `vlod_hidden`.
-        parts: as of `vlod_hidden`.
-        weights: of the parts, such as their triangles, shape (p,).
+        pieces: as of `vlod_hidden`.
+        weights: of the pieces, such as their triangles, shape (p,).
         settings: of the method; the objective plays no part.
     """
-    method = _Method(occluders, np.asarray(parts, np.int32), replace(settings, objective="centre"), VlodStats())
+    method = _Method(occluders, np.asarray(pieces, np.int32), replace(settings, objective="centre"), VlodStats())
     view = method.prepare(np.asarray(cell)[None])[0]
-    everything = np.arange(len(parts))
+    everything = np.arange(len(pieces))
 
     def score_of(cluster: int) -> Callable[[np.ndarray], float]:
         rows = np.flatnonzero(view.cluster == cluster)
@@ -251,7 +251,7 @@ class _Method:
     """Occluders, occludees and settings, and how view cells are done with them."""
 
     occluders: Patches
-    parts: np.ndarray
+    pieces: np.ndarray
     settings: VlodSettings
     stats: VlodStats
     device: Device = CPU
@@ -276,13 +276,13 @@ class _Method:
         return views
 
     def hidden(self, view: _View, chosen: np.ndarray) -> np.ndarray:
-        """Whether each chosen part is hidden from a view cell, shape (len(chosen),), bool."""
+        """Whether each chosen piece is hidden from a view cell, shape (len(chosen),), bool."""
         out = np.zeros(len(chosen), bool)
-        shell, limits = self._shells(view.cell, self.parts[chosen])
+        shell, limits = self._shells(view.cell, self.pieces[chosen])
         for number, limit in enumerate(limits):
             mine = np.flatnonzero(shell == number)
             if len(mine):
-                out[mine] = self._covered(view, limit, self.parts[chosen[mine]])
+                out[mine] = self._covered(view, limit, self.pieces[chosen[mine]])
         return out
 
     def _largest(self, cell: np.ndarray) -> np.ndarray:
@@ -311,7 +311,7 @@ class _Method:
             seeds = [[self.settings.seed, *(cell.astype(np.int64) + GRID_LIMIT).ravel()] for cell in cells]
             share = np.stack([np.random.default_rng(seed).random(shape[1:]) for seed in seeds])
             return cells[:, None, 0] + share * (cells[:, None, 1] - cells[:, None, 0])
-        size = self.parts.max(axis=(0, 1), initial=1).astype(float) - self.parts.min(axis=(0, 1), initial=0)
+        size = self.pieces.max(axis=(0, 1), initial=1).astype(float) - self.pieces.min(axis=(0, 1), initial=0)
         objective = "lp" if self.settings.objective == "lp" else "socp"
         only = {"objective": objective, "depth": float(np.linalg.norm(size))}
         problems = cluster_problems(umbras, cells, cell_of, cluster, self.settings.clusters, **only)

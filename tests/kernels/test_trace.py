@@ -1,4 +1,4 @@
-"""Walking sightlines through portals against the walk of verify/, and each walk checked in rationals."""
+"""Tracing sightlines through portals against the twin, and each trace checked in rationals."""
 
 from fractions import Fraction
 
@@ -40,7 +40,7 @@ def check_exactly(graph, cell, target, portals, origin, end):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_walks_as_the_exact_twin_walks(seed):
+def test_traces_as_the_twin_does(seed):
     graph, _ = random_buildings.random_graph(seed, walls=5)
     sources, origins, ends = random_segments(graph, np.random.default_rng(seed), 500)
     reached, starts, portals = launch_trace(device_graph(graph), sources, origins, ends)
@@ -69,7 +69,7 @@ def test_threads_change_nothing():
 
 
 def test_a_line_through_an_edge_of_a_portal_is_given_up():
-    """Along the rim of the first portal float64 could not be sure, so the walk ends there."""
+    """Along the rim of the first portal float64 could not be sure, so the trace ends there."""
     graph, _ = random_buildings.random_graph(2, walls=5)
     box, axis = graph.portals[0].astype(float), int(graph.portal_axis[0])
     cell = graph.cells[graph.portal_cells[0, 0]]

@@ -1,9 +1,9 @@
-"""Hard cases as text: geometry that breaks visibility code, and the exact answer, one case a line.
+"""Hard cases as text: geometry that breaks visibility code, and the exact answer, one case per line.
 
-The folder data/hard_cases holds one file a kind of question. Fields are separated by semicolons, # starts a comment, a
-point is `x y z`, points are separated by commas and shapes by |. A shape is a polygon of three or more points, or two
+The folder data/hard_cases holds one file per kind of question. Fields are separated by semicolons, # starts a comment,
+a point is `x y z`, points are separated by commas and shapes by |. A shape is a polygon of three or more points, or two
 points, low and high corner: a rectangle if they agree on one axis, a closed box if on none. Numbers are grid steps,
-integers unless said otherwise. The files are the truth; tests hold every answer against a twin in this folder.
+integers unless said otherwise. The files are the truth; tests hold every answer against an exact twin.
 """
 
 import itertools
@@ -112,7 +112,7 @@ class BackfaceCase:
 
 
 @dataclass(frozen=True)
-class Walk:
+class Trace:
     """The cell where a segment from a source cell ends; -1 if it meets a wall or a portal's edge."""
 
     source: int
@@ -129,7 +129,7 @@ class GraphCase:
         cells: (low, high) each; they do not overlap, and their faces are walls but for the portals.
         portals: (cell on the low side, cell on the high side, rectangle) each.
         seen: pairs of different cells, the lower number first, that an open set of lines joins.
-        walks: single segments, float64.
+        traces: single segments, float64.
         origin: where the case came from.
     """
 
@@ -137,7 +137,7 @@ class GraphCase:
     cells: list[Shape]
     portals: list[tuple[int, int, Shape]]
     seen: set[tuple[int, int]]
-    walks: list[Walk]
+    traces: list[Trace]
     origin: str
 
 
@@ -199,7 +199,7 @@ class HardCases:
 
 
 def load_hard_cases(folder: str | Path = FOLDER) -> HardCases:
-    """Cases of a folder's files stab.txt, shadow.txt, ..., one a kind.
+    """Cases of a folder's files stab.txt, shadow.txt, ..., one per kind.
 
     Raises:
         InputError: a file is missing or not text, a line has another form than its kind, or a name comes twice.
@@ -242,7 +242,7 @@ def fan(polygon: Shape) -> list[Shape]:
 
 
 def _lines(path: Path, form: str, build: Callable[..., Case]) -> list[Case]:
-    """One case a line, built from its fields."""
+    """One case per line, built from its fields."""
     cases = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         line = line.partition("#")[0].strip()
@@ -341,7 +341,7 @@ def _backface(name: str, expected: str, cell: str, surface: str, origin: str) ->
     return BackfaceCase(name, int(expected), _box(cell), _shapes(surface), origin)
 
 
-def _graph(name: str, cells: str, portals: str, seen: str, walks: str, origin: str) -> GraphCase:
+def _graph(name: str, cells: str, portals: str, seen: str, traces: str, origin: str) -> GraphCase:
     boxes, openings, segments = [_box(cell) for cell in cells.split("|")], [], []
     for part in portals.split("|"):
         ends, rectangle = part.split(":")
@@ -352,13 +352,13 @@ def _graph(name: str, cells: str, portals: str, seen: str, walks: str, origin: s
         if len(faces(opening)) > 1:
             raise ValueError
         openings.append((a, b, opening))
-    for part in walks.split("|") if walks != "-" else []:
+    for part in traces.split("|") if traces != "-" else []:
         ends, segment = part.split(":")
         source, reached = ends.split()
-        walk = Walk(int(source), -1 if reached == "-" else int(reached), _shape(segment, float))
-        if not (0 <= walk.source < len(boxes) and -1 <= walk.reached < len(boxes) and len(walk.segment) == 2):
+        trace = Trace(int(source), -1 if reached == "-" else int(reached), _shape(segment, float))
+        if not (0 <= trace.source < len(boxes) and -1 <= trace.reached < len(boxes) and len(trace.segment) == 2):
             raise ValueError
-        segments.append(walk)
+        segments.append(trace)
     pairs = _pairs(seen, len(boxes), len(boxes))
     if any(a >= b for a, b in pairs):
         raise ValueError
@@ -397,7 +397,7 @@ LOADERS: dict[str, Callable[[Path], list]] = {
     "sightline": _loader("name; expected; segment; excepted; triangles; origin", _sightline),
     "coverage": _loader("name; expected; viewpoint; size; polygons; box; pixels; origin", _coverage),
     "backface": _loader("name; expected; cell; surface; origin", _backface),
-    "graph": _loader("name; cells; portals; seen; walks; origin", _graph),
+    "graph": _loader("name; cells; portals; seen; traces; origin", _graph),
     "model": _loader("name; objects; cells; seen; origin", _model),
     "knapsack": _loader("name; expected; budget; objects; origin", _knapsack),
 }

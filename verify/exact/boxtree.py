@@ -1,4 +1,4 @@
-"""Which boxes may a segment meet? A bounding-volume hierarchy walked by all segments at once in NumPy."""
+"""Which boxes may a segment meet? A bounding-volume hierarchy traversed by all segments at once in NumPy."""
 
 import numpy as np
 
@@ -85,7 +85,7 @@ class BoxTree:
 
 
 def _morton_order(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Order of the boxes' centres along a Morton curve of 2**21 steps an axis."""
+    """Order of the boxes' centres along a Morton curve of 2**21 steps per axis."""
     sums = low.astype(np.float64) + high
     start = sums.min(axis=0, initial=np.inf)
     width = max(float((sums - start).max(initial=0)), 1.0)

@@ -55,7 +55,7 @@ class RegionAnswer:
         start: of a witness segment, strictly inside the cell, exact; None unless VISIBLE.
         end: of it, in the relative interior of the target. The closed segment meets no occluder, those in the target's
             plane apart.
-        certificate: one tuple of trees a face of the target, see `region_certificate.holds`; None unless HIDDEN.
+        certificate: one tuple of trees per face of the target, see `region_certificate.holds`; None unless HIDDEN.
         nodes: of the search.
     """
 

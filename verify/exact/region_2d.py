@@ -138,7 +138,7 @@ class _Search:
         self.target, self.line, self.walls, self.nodes = target, _cross(*target), walls, 0
 
     def certificate(self) -> tuple:
-        """A pair of trees an edge of the cell.
+        """A pair of trees per edge of the cell.
 
         Raises:
             _Seen: the target is visible along a segment from (origin) in direction (step) to (end).

@@ -43,7 +43,7 @@ def holds(cell: Sequence[Points], target: Points, occluders: Sequence[Points], t
         cell: the faces of a convex polytope, either way round.
         target: a planar convex polygon.
         occluders: planar convex polygons; those in the target's plane prove nothing.
-        trees: one a face, of ("split", 0 for a or 1 for b, normal, offset, below, above), ("branch", occluder,
+        trees: one per face, of ("split", 0 for a or 1 for b, normal, offset, below, above), ("branch", occluder,
             children in the order of its edges), ("leaf", weights of the edges chosen on the way) and None for nothing.
     """
     faces, inside, walls = [rational(face) for face in cell], rational(target), [rational(o) for o in occluders]

@@ -1,7 +1,7 @@
-"""Pieces of shafts as certificates (data/store/certificates.py), checked exactly in Python integers.
+"""Leaves of shafts as certificates (data/store/certificates.py), checked exactly in Python integers.
 
-A box is hidden from a cell if pieces tile cell x box, so that every segment from the one to the other is in a piece,
-and an occluder meets all segments of each piece. Oblique occluders need this; axial ones are left to line trees.
+A box is hidden from a cell if subshafts tile cell x box, so that every segment from the one to the other is in one, and
+an occluder meets all segments of each subshaft. Oblique occluders need this; axial ones are left to line trees.
 """
 
 from collections import defaultdict
@@ -173,14 +173,14 @@ def check_shafts(
     which = places_of(leaves["occluder_id"].to_numpy(), occluder_ids, paths[0], "occluder_id").tolist()
     corners = corners_of(leaves, LEAVES[2:], bake.grid_m, paths[0]).reshape(-1, 2, 2, 3).tolist()
     occluders = [_occluder(row, surfaces, bake.grid_m, found) for row in table.to_pylist()]
-    pieces: dict[int, list[Box]] = defaultdict(list)
+    subshafts: dict[int, list[Box]] = defaultdict(list)
     good = np.zeros(len(ids), bool)
     good[rows] = True
     for row, occluder, (v, x) in zip(rows, which, corners, strict=True):
-        pieces[row].append([v[0] + x[0], v[1] + x[1]])
+        subshafts[row].append([v[0] + x[0], v[1] + x[1]])
         if good[row] and not (occluders[occluder] and leaf_holds(v, x, occluders[occluder])):
             good[row] = False
-    for row, parts in pieces.items():
+    for row, parts in subshafts.items():
         whole = np.concatenate([cells[row], boxes[row]], axis=1).tolist()
         good[row] = good[row] and tiled(*whole, parts)
     found.leaves += len(rows)
@@ -215,5 +215,5 @@ def _occluder(row: dict, surfaces: OpaqueSurfaces | None, grid_m: float, found: 
 def _points(metres: list[float] | None, width: int, grid_m: float, where: str) -> np.ndarray:
     """Numbers of a list in rows of some width [grid steps], int64."""
     if not metres or len(metres) % width:
-        raise InputError(f"{where}: expected a list of {width} numbers a point or rectangle, found {metres}")
+        raise InputError(f"{where}: expected a list of {width} numbers per point or rectangle, found {metres}")
     return steps_of(np.array(metres, float), grid_m, where).reshape(-1, width)

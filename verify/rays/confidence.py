@@ -49,6 +49,6 @@ class Confidence:
         alone = -SPHERE * math.expm1(math.log(0.01) / least)
         return (
             f"with {100 * (1 - self.level):g} % confidence no view cell of {len(self.rays):,} hides more than "
-            f"{worst:.2g} sr of what a random eye in it sees (at least {least:,} random rays a cell; a hole of "
+            f"{worst:.2g} sr of what a random eye in it sees (at least {least:,} random rays per cell; a hole of "
             f"{alone:.2g} sr in a given cell would have been missed with probability below 1 %)"
         )

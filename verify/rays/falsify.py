@@ -77,7 +77,7 @@ class Falsifier:
         threads: int = THREADS,
         seed: int = 0,
     ):
-        """Prepare the search; it needs about 40 bytes a pair of view cell and target.
+        """Prepare the search; it needs about 40 bytes per pair of view cell and target.
 
         Args:
             boxes: view cells [grid steps], shape (rows, 2, 3), int32.

@@ -68,7 +68,11 @@ def pass_edges(
     seed: int,
     past_out: wp.array[wp.vec3],
 ):
-    """A point `steps` outside the nearest to each ray of `EDGES` random edges of its blocker; its end without edges."""
+    """A point to aim each ray at so that it just passes its blocker.
+
+    `EDGES` random edges of the blocker are tried; from the point where the one nearest to the ray comes closest to it,
+    `steps` grid steps on, away from the ray. A blocker without edges gives the ray's own end.
+    """
     ray = wp.tid()
     first = edges.first[blockers[ray]]
     count = edges.first[blockers[ray] + 1] - first
@@ -95,7 +99,7 @@ def pass_edges(
 
 
 def edge_table(opaque: tuple[np.ndarray, np.ndarray], objects: int) -> EdgeTable:
-    """The edges that may be silhouettes; `surfaces.sharp_edges`."""
+    """The edges that may be silhouettes; see `targets.sharp_edges`."""
     owners, starts, ends = sharp_edges(*opaque)
     table = EdgeTable()
     first = np.searchsorted(owners, np.arange(objects + 1)).astype(np.int32)
@@ -177,7 +181,7 @@ class Guide:
         hints: Hints | None,
         seed: int,
     ):
-        """Compare the claim with what is near what.
+        """Weigh every hidden pair by how many near neighbours of its target are claimed.
 
         Args:
             free: view cells.
@@ -320,9 +324,12 @@ class Guide:
         return self._shaken(np.asarray(self._hints.rows, np.int64)[chosen], *ends, rng)
 
     def _gap(self, count: int, rng: np.random.Generator) -> Aimed | None:
-        """From the point aimed at past an edge of the blocker to the view cell; if that misses it, from the origin.
+        """Rays that pass beside what blocked an earlier ray.
 
-        The silhouette lies about the ray, so that on from the ray through the nearest point of an edge is outside.
+        The line through the target point of the earlier ray and a point just past an edge of its blocker is followed
+        back into the view cell, and a random point of it there is the new origin. Where it misses the view cell, the
+        old origin looks past the edge. The blocker's silhouette surrounds the earlier ray, so a step away from that ray
+        beyond the nearest point of an edge is a step out of the silhouette.
         """
         if not self._blocked or not len(self._blocked[0]):
             return None

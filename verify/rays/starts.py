@@ -72,7 +72,7 @@ def frontier_points(links: Links, boxes: np.ndarray, potential: np.ndarray, coun
         links: ways between the cells.
         boxes: cells [grid steps], shape (cells, 2, 3).
         potential: shape (rows, cells), bool.
-        count: of points a row.
+        count: points per row.
         seed: of the draw.
 
     Returns:

@@ -199,7 +199,7 @@ class WindingLines:
 
         Returns:
             Claimed pairs that a line joins, shape (leaves, leaves), bool, and suspects: (leaf, target, origin,
-            direction, margin) of pairs that are not claimed, at most KEPT a leaf; map units, float64.
+            direction, margin) of pairs that are not claimed, at most KEPT per leaf; map units, float64.
         """
         count = self.portals.leaf_count
         seen = np.zeros((count, count), np.uint8)

@@ -93,7 +93,7 @@ class LevelSettings:
     """Levels of detail.
 
     Attributes:
-        lods: simplify definitions that have a single level, and store which levels do from where.
+        lods: simplify definitions that have a single level, and store which levels are good enough from which cells.
         pixels: a level may deviate on the image by no more.
         image: width x height of the image that `pixels` are counted on.
         fov_deg: its vertical field of view.

@@ -21,7 +21,7 @@ from .timing import commit, median_range, print_head, print_row
 
 REPEATS = 7
 THREADS = (1, 2)
-# Stabbing decisions a source and octant of the plain search, and sources between looks at the clock.
+# Stabbing decisions per source and octant of the plain search, and sources between looks at the clock.
 BASELINE_CAP = 200_000
 BASELINE_CHUNK = 8
 HEAD = (

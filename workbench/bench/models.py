@@ -36,7 +36,7 @@ HEAD = (
     "undecided % of all pairs of cells",
     "rays",
     "wrong hidden",
-    "rays a second",
+    "rays per second",
     "of Embree's own",
     "witnesses confirmed, refuted",
     "commit",

@@ -40,7 +40,7 @@ HEAD = (
     "budget s",
     "make s",
     "seconds by phase",
-    "ms a cell",
+    "ms per cell",
     "peak GB",
     "potential a cell",
     "seen a cell",

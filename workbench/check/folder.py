@@ -186,7 +186,7 @@ def _by_portals(model: Path, rows: pa.Table, origins: np.ndarray, ends: np.ndarr
 
 def _by_windings(model: Path, rows: pa.Table, origins: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Which sightlines pass the windings of an oblique map."""
-    walk = WindingLines(read_prt(model))
+    windings = WindingLines(read_prt(model))
     pairs = zip(rows["cell"].to_pylist(), rows["target"].to_pylist(), origins, ends, strict=True)
-    found = [walk.path(leaf, target, origin, end - origin) is not None for leaf, target, origin, end in pairs]
+    found = [windings.path(leaf, target, origin, end - origin) is not None for leaf, target, origin, end in pairs]
     return np.array(found, bool)

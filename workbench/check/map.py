@@ -102,22 +102,22 @@ def _follow_lines(
     joined[portals.leaves.ravel()] = True
     result = CheckResult(np.arange(count), np.flatnonzero(joined), [], {"cell": claimed}, {"cell": seen})
     start = time.perf_counter()
-    walk = WindingLines(portals)
+    windings = WindingLines(portals)
     judging = 0.0
     with tqdm(total=each * count, unit="line", unit_scale=True, disable=not progress) as bar:
         for first in range(0, each, ROUND_LINES):
             lines = min(ROUND_LINES, each - first)
             # Five numbers in a row seed a launch.
-            found, suspects = walk.sample(settled, lines, seed + 5 * (first // ROUND_LINES))
+            found, suspects = windings.sample(settled, lines, seed + 5 * (first // ROUND_LINES))
             seen |= found
             judged = time.perf_counter()
             for leaf, target, origin, direction, margin in suspects:
-                path = walk.path(leaf, target, origin, direction)
+                path = windings.path(leaf, target, origin, direction)
                 if path is None:
                     result.grazes += 1
                 elif not settled[leaf, target]:
                     settled[leaf, target] = True
-                    end = walk.beyond(path[-1], origin, direction)
+                    end = windings.beyond(path[-1], origin, direction)
                     result.wrong.append(WrongPair("cell", leaf, target, origin, end, tuple(path), margin))
             judging += time.perf_counter() - judged
             bar.update(lines * count)

@@ -125,7 +125,7 @@ class _Sweeper:
             yield self._run("projection points", "resolution, pixels", resolution, settings)
         for clusters in CLUSTERS:
             yield self._run("projection points", "clusters", clusters, Settings(method="vlod", clusters=clusters))
-        yield from _sampled(made, "rays a cell", RAYS, False, self._seed)
+        yield from _sampled(made, "rays per cell", RAYS, False, self._seed)
 
     def budgets(self, whole: "BakeFolder") -> Iterator[_Run]:
         """All inhabitable cells at once, stopped early."""
@@ -197,7 +197,7 @@ class _GraphSweeper:
         bake_ = self._bake
         seconds = _seconds(bake_)
         yield _Run("portals alone", "no knob", 1.0, seconds, bake_.potential_cells, _seen_cells(bake_))
-        yield from _sampled(bake_, "rays a cell", GRAPH_RAYS, True, self._seed)
+        yield from _sampled(bake_, "rays per cell", GRAPH_RAYS, True, self._seed)
 
 
 def _run(made: "BakeFolder", method: str, knob: str, value: float) -> _Run:

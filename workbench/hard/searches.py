@@ -148,16 +148,16 @@ def _rectangle(box: np.ndarray) -> list[tuple[int, ...]]:
 def trace(cases: HardCases, device: Device) -> Outcomes:
     """Sightlines of each graph."""
     for case in cases.graph:
-        if not case.walks:
+        if not case.traces:
             continue
-        ends = np.array([walk.segment for walk in case.walks])
-        sources = np.array([walk.source for walk in case.walks])
+        ends = np.array([asked.segment for asked in case.traces])
+        sources = np.array([asked.source for asked in case.traces])
         graph = _engine(case, device).model.device_graph
         reached = launch_trace(graph, sources, ends[:, 0], ends[:, 1], device=device)[0]
         outcomes = []
-        for walk, cell in zip(case.walks, reached.tolist(), strict=True):
+        for asked, cell in zip(case.traces, reached.tolist(), strict=True):
             outcomes.append(
-                Outcome.RIGHT if cell == walk.reached else Outcome.WITHHELD if cell == -1 else Outcome.WRONG
+                Outcome.RIGHT if cell == asked.reached else Outcome.WITHHELD if cell == -1 else Outcome.WRONG
             )
         yield case.name, worst(outcomes)
 

@@ -212,7 +212,7 @@ def _by_float32(knob: str, value: float, cases: list[SightlineCase]) -> Row:
 
 
 def stability_table(rows: list[Row]) -> str:
-    """One line a kernel and knob: where it is wrong, withholds, refuses."""
+    """One line per kernel and knob: where it is wrong, withholds, refuses."""
     found = []
     for knob in dict.fromkeys(row.knob for row in rows):
         for kernel in dict.fromkeys(row.kernel for row in rows if row.knob == knob):

@@ -54,8 +54,8 @@ MISSES_MOST, SWITCHES_MOST = 0.01, 0.02
 SWITCHES_FACTOR = 1.5
 RULE = (
     f"least value lost, over all budgets, among the settings that miss at most {MISSES_MOST:.0%} of the modelled frame "
-    f"times and change at most {SWITCHES_MOST:.0%} of the objects shown a frame, or at most {SWITCHES_FACTOR} times as "
-    f"many as the setting that changes fewest; of those that lose equally little, the quickest"
+    f"times and change at most {SWITCHES_MOST:.0%} of the objects shown per frame, or at most {SWITCHES_FACTOR} times "
+    f"as many as the setting that changes fewest; of those that lose equally little, the quickest"
 )
 
 
@@ -310,7 +310,7 @@ def recommend(outcomes: Sequence[Outcome]) -> tuple[str, bool, str]:
     reason = (
         f"recommended: {best[0]}, {'with' if best[1] else 'without'} coherence. Of all that change few levels it loses "
         f"least: {percent(mean('lost_mean', best))} % of the certified bound on average, "
-        f"{percent(most('lost_most', best))} % at worst; {mean('switches', best):.2f} levels change a frame "
+        f"{percent(most('lost_most', best))} % at worst; {mean('switches', best):.2f} levels change per frame "
         f"({plain:.2f} without coherence); {100 * most('modelled_misses', best):.1f} % of the frames miss their "
         f"modelled time; {mean('choose_ms', best):.2f} ms to choose (rule: {RULE})"
     )

@@ -23,7 +23,7 @@ class Outcome:
         lost_mean: mean of 1 - value / certified bound: what the best choice could have more is no more than that.
         lost_most: the largest.
         kept_detail: value over that of all finest levels, over all frames.
-        switches: objects a frame that change level; None where the frames do not follow one another.
+        switches: objects per frame that change level; None where the frames do not follow one another.
         switch_share: of the objects shown; likewise.
         modelled_misses: share of frames whose modelled time is above the budget.
         measured_misses: likewise of those drawn by the software renderer; None if the costs are not its own.
@@ -79,7 +79,7 @@ class Tuning:
 
     def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Head and rows of the table."""
-        head = ("budget ms", "method", "coherence", "lost %, mean", "worst", "of finest %", "switches a frame")
+        head = ("budget ms", "method", "coherence", "lost %, mean", "worst", "of finest %", "switches per frame")
         head += ("over target %", "measured %", "choosing ms")
         rows = []
         for o in self.outcomes:

@@ -134,7 +134,7 @@ def tune_projection_point(
         f"Projection points of {Path(bake.folder).name}: {pixels}",
         candidates,
         recommended,
-        ("ms a view cell", "potential / seen"),
+        ("ms per view cell", "potential / seen"),
         [rule, _note(wrong), "", _solver_table(solvers)],
     )
     return PointTuning(folder, candidates, solvers, recommended, wrong)
@@ -198,7 +198,7 @@ class _Bench:
             1e3 * seconds / count,
             float(potential.sum() / max(1, self._seen.sum())),
             {
-                "solving, ms a cell": round(1e3 * solving / count, 2),
+                "solving, ms per cell": round(1e3 * solving / count, 2),
                 "culled triangles": f"{100 * (hidden @ self._triangles).sum() / (count * self._triangles.sum()):.1f} %",
                 "wrong hidden": int((hidden & self._seen).sum()),
             },
@@ -319,7 +319,7 @@ def point_lines(found: PointTuning) -> str:
     ]
     return "\n".join(
         [
-            table(("setting (* none is both faster and tighter)", "ms a cell", "potential / seen", *names), rows),
+            table(("setting (* none is both faster and tighter)", "ms per cell", "potential / seen", *names), rows),
             "",
             _solver_table(found.solvers),
             "",

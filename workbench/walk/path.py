@@ -14,7 +14,7 @@ from ...data.store.graph_folder import numbers
 from ...data.store.view_cells import read_rows
 
 COLUMNS = ("x", "y", "z", "yaw", "pitch", "t")
-# How somebody walks: eye above the floor [m], speed [m/s], and frames a second, as the papers'.
+# How somebody walks: eye above the floor [m], speed [m/s], and frames per second, as the papers'.
 EYE_M, SPEED, RATE = 1.7, 1.4, 10.0
 # The eye keeps away from the faces of what it walks through, where that is so large.
 KEEP_OFF_M = 0.1

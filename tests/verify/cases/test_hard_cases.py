@@ -95,14 +95,14 @@ def graph_answer(case):
     return set(map(tuple, np.argwhere(np.triu(reached, 1)).tolist()))
 
 
-def walks_answer(case):
-    """Cells where the walks end."""
+def traces_answer(case):
+    """Cells where the traces end."""
     graph, found = graph_of(case), []
-    for walk in case.walks:
-        origin, end = np.array(walk.segment)
+    for trace in case.traces:
+        origin, end = np.array(trace.segment)
         holding = np.flatnonzero(((graph.cells[:, 0] < end) & (graph.cells[:, 1] > end)).all(axis=1)).tolist()
         paths = [
-            portal_path(portal_links(graph), graph.cells, walk.source, cell, origin, end - origin) for cell in holding
+            portal_path(portal_links(graph), graph.cells, trace.source, cell, origin, end - origin) for cell in holding
         ]
         found.append(-1 if paths in ([], [None]) else holding[0])
     return found
@@ -145,7 +145,7 @@ ANSWERS = {
     "covered boxes": (CASES.coverage, coverage_answer, said, 16),
     "backface": (CASES.backface, backface_answer, said, 1),
     "graph": (CASES.graph, graph_answer, lambda case: case.seen, 1),
-    "walks": (CASES.graph, walks_answer, lambda case: [walk.reached for walk in case.walks], 1),
+    "traces": (CASES.graph, traces_answer, lambda case: [trace.reached for trace in case.traces], 1),
     "model": (CASES.model, model_answer, lambda case: case.seen, 18),
     "knapsack": (CASES.knapsack, knapsack_answer, said, 1),
 }

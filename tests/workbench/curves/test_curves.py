@@ -49,11 +49,11 @@ def test_every_knob_of_a_model_is_swept(baked, quick, tmp_path, capsys):
     # More time never makes it looser.
     early, late = sorted(methods["occluders, all cells", "budget, share"].points, key=lambda p: p.value)
     assert early.error >= late.error and late.unknown < 0.3
-    few, many = methods["sampling alone", "rays a cell"].points
+    few, many = methods["sampling alone", "rays per cell"].points
     assert few.error < many.error < 1 and few.wrong_hidden > many.wrong_hidden > 0
     shares = [p.error for p in methods["levels of detail", "pixels"].points]
     assert shares == sorted(shares, reverse=True) and shares[-1] < 1
-    assert "sampling alone, rays a cell" in said and (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
+    assert "sampling alone, rays per cell" in said and (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
     assert "NaN" not in (tmp_path / "curves.json").read_text()
 
 

@@ -28,7 +28,7 @@ FLOORS, ROOMS = 1, 3
 JUDGED_CULLS, REFERENCE_CULLS = 40, 100
 JUDGED_SHAFTS, SEGMENTS_A_SHAFT, REFERENCE_SHAFTS = 100, 40, 20
 JUDGED_RAYS = 500
-# Sides that the shaft test does not halve further [grid steps], and pieces a pair.
+# Sides that the shaft test does not halve further [grid steps], and pieces per pair.
 SMALLEST, PIECES = (256, 256), 300
 
 

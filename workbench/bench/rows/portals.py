@@ -26,7 +26,7 @@ BOXES, JUDGED_LISTS, LP_LISTS = 8, 200, 20
 MISSES = 200
 # Rooms of 4 m by 4 m by 3 m [grid steps].
 ROOM = np.array([4096, 4096, 3072])
-# Stabbing decisions a source and octant of the plain search: in halls it stops there, without all answers.
+# Stabbing decisions per source and octant of the plain search: in halls it stops there, without all answers.
 PLAIN_CAP = 200_000
 JUDGED_SOURCES, PLAIN_SOURCES, PLAIN_OPEN_SOURCES = 2, 200, 4
 # Portal sequences of the exact search from one source: some seconds.

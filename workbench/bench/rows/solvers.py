@@ -110,7 +110,7 @@ def judge_selection(asked: Knapsacks, found: Selections) -> Errors:
 
 
 def programmes(count: int, rows: int, seed: int) -> list[Problem]:
-    """Cone programmes of one size: cells of 2 to 8 m, four supporting planes an occluder, 0.6 to 20 cells away."""
+    """Cone programmes of one size: cells of 2 to 8 m, four supporting planes per occluder, 0.6 to 20 cells away."""
     random, out = np.random.default_rng(seed), []
     for _ in range(count):
         occluders = (rows - 6) // 5
