@@ -62,8 +62,8 @@ def build_levels(boxes: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
         boxes: shape (n, 2, 3), integers.
 
     Returns:
-        Node bounds, one array (2**level, 2, 3), int32, a level, low > high where empty; and the box of each node of the
-        last level, -1 for none.
+        Node bounds, one array (2**level, 2, 3), int32, per level, low > high where empty; and the box of each node of
+        the last level, -1 for none.
     """
     count = len(boxes)
     depth = int(np.ceil(np.log2(count))) if count > 1 else 0

@@ -50,7 +50,8 @@ def find_occludees(scene: Scene) -> Occludees:
     bounds = scene.object_bounds()
     present = np.flatnonzero((bounds[:, 0] <= bounds[:, 1]).all(axis=1))
     levels, objects = build_levels(bounds[present])
-    objects = np.where(objects >= 0, present[objects], -1).astype(np.int32)
+    # An empty node's -1 takes the last entry: -1.
+    objects = np.append(present, -1)[objects].astype(np.int32)
     pieces, owner = _pieces(scene, bounds)
     return Occludees(
         bounds.astype(np.int32), levels, objects, pieces, np.searchsorted(owner, np.arange(len(bounds) + 1))

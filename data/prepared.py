@@ -79,7 +79,11 @@ class PreparedModel:
         large = np.flatnonzero(_flat_area(np.ptp(corners, axis=1)) >= PATCH_SHARE * least)
         edges = (corners[large, 1:] - corners[large, :1]).astype(float)
         large = large[np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) >= 2 * PATCH_SHARE * least]
-        return find_patches(corners[large], owners[large], least_area=least)
+        found = find_patches(corners[large], owners[large], least_area=least)
+        # Members are places among the large triangles of their owner; certificates want them among all of its.
+        ahead, first = np.searchsorted(owners[large], found.owner), np.searchsorted(owners, found.owner)
+        found.members = [large[a + held] - f for a, f, held in zip(ahead, first, found.members, strict=True)]
+        return found
 
     @cached_property
     def outlines(self) -> Patches:

@@ -6,14 +6,17 @@ from itertools import pairwise, product
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import trimesh
 from builders import certified_bake
 from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.errors import InputError
-from viewcell.data.scene import GRID_M
+from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
 from viewcell.verify.proofs.boxes import in_boxes
 from viewcell.verify.proofs.line_tree import check_certificates
 from viewcell.verify.proofs.shaft import Disc, Region, leaf_holds, tiled
+from viewcell.workbench.bake.run import bake
+from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.baked import load
 
 with_value, step = certified_bake.with_value, certified_bake.step
@@ -297,3 +300,23 @@ def test_pieces_with_a_gap_of_a_step_do_not_hold_a_triangle():
         changed = np.array([left, right])
         changed[1, side, axis] += change
         assert not in_boxes(triangle, changed)
+
+
+def test_patches_of_objects_with_small_triangles_are_found_again(tmp_path):
+    """A screen whose mesh starts with scraps hides a box; the certificate names the large triangles among all."""
+    screen = np.array([[0, -8, -8], [3, 8, -8], [3, 8, 8], [0, -8, 8]], float)
+    scraps = np.array([[0, 0, 9], [0.1, 0, 9], [0, 0.1, 9.05]])
+    corners = np.concatenate([scraps, screen[[0, 1, 2]], scraps + 1.0, screen[[0, 2, 3]]])
+    corners = np.round(corners / GRID_M) * GRID_M
+    mesh = Mesh(corners, np.arange(12, dtype=np.int32).reshape(-1, 3))
+    crate = trimesh.creation.box([1.0, 1.0, 1.0])
+    crate.apply_translation([6.0, 0.5, 0.5])
+    shapes = [mesh, Mesh(np.array(crate.vertices), np.array(crate.faces, np.int32))]
+    objects = [Instance(str(i), "", i, np.eye(4), Role.OCCLUDER) for i in range(2)]
+    scene = Scene([Definition(str(i), (shape,)) for i, shape in enumerate(shapes)], objects)
+    (tmp_path / "cells.csv").write_text("min_x,min_y,min_z,max_x,max_y,max_z\n-4,0,0,-3,1,1\n")
+    settings = Settings(method="occluders", cells=str(tmp_path / "cells.csv"), certify=True)
+    made = bake(scene, tmp_path / "out.bake", settings=settings)
+    assert made.potential(0).tolist() == [0]
+    found = check_certificates(made)
+    assert found.failed == 0 and found.leaves > 0

@@ -1,0 +1,105 @@
+"""A model prepared once: each part is made once, from the right triangles, and names what it is made of."""
+
+import numpy as np
+import pytest
+from builders import random_solids, small_house
+from viewcell.data import prepared
+from viewcell.data.prepared import PreparedModel, no_patches, no_regions
+from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
+from viewcell.verify.proofs.opaque import bounds_disc
+
+
+def slanted(size, at=(0.0, 0.0, 0.0)):
+    """Two triangles of an oblique square [m]."""
+    corners = np.array([[0, 0, 0], [1, 0, 0.5], [1, 1, 0.5], [0, 1, 0]]) * size + np.array(at)
+    return corners[[0, 1, 2, 0, 2, 3]]
+
+
+def object_of(*parts):
+    corners = np.round(np.concatenate(parts) / GRID_M) * GRID_M
+    return Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+
+
+def scene_of(*meshes, role=Role.OCCLUDER):
+    definitions = [Definition(str(i), (mesh,)) for i, mesh in enumerate(meshes)]
+    return Scene(definitions, [Instance(str(i), "", i, np.eye(4), role) for i in range(len(meshes))])
+
+
+def test_patches_name_their_triangles_among_all_of_their_object():
+    """Small triangles before and between the large ones are looked over, but they count."""
+    scraps, large = slanted(0.05, (5, 0, 0)), slanted(3.0)
+    scene = scene_of(object_of(scraps), object_of(scraps, large[:3], scraps, large[3:]))
+    patches = PreparedModel(scene).patches
+    assert patches.owner.tolist() == [1] and sorted(patches.members[0].tolist()) == [2, 5]
+    triangles, starts = scene.triangles()[0], scene.triangle_starts
+    members = triangles[starts[1] + patches.members[0]]
+    assert bounds_disc(members, patches.corners.tolist())
+
+
+def test_every_part_is_made_once(monkeypatch):
+    made = []
+    for name in ("closed_elements", "opaque_planes", "find_regions", "find_patches", "find_occludees"):
+        work = getattr(prepared, name)
+        monkeypatch.setattr(prepared, name, lambda *a, work=work, name=name, **k: (made.append(name), work(*a, **k))[1])
+    model = PreparedModel(random_solids.random_solids(1))
+    assert not made
+    for _ in range(2):
+        _ = (
+            model.closed,
+            model.planes,
+            model.blocking_planes,
+            model.regions,
+            model.patches,
+            model.outlines,
+            model.occludees,
+        )
+    assert sorted(made) == sorted(
+        ["closed_elements", "opaque_planes", "opaque_planes", "find_regions", "find_patches", "find_occludees"]
+    )
+
+
+def test_glass_is_no_part_of_what_hides():
+    scene = small_house.small_scene()
+    model, glass = PreparedModel(scene), scene.object_mask(Role.TRANSPARENT)
+    opaque = PreparedModel(Scene(scene.definitions, [o for o in scene.objects if o.role is not Role.TRANSPARENT]))
+    for name in ("planes", "blocking_planes"):
+        for mine, other in zip(getattr(model, name).boxes, getattr(opaque, name).boxes, strict=True):
+            np.testing.assert_array_equal(mine, other)
+    np.testing.assert_array_equal(model.regions.boxes, opaque.regions.boxes)
+    assert not glass[[object_id for object_id, _ in model.closed]].any()
+    assert len(model.occludees.bounds) == len(scene.objects), "but it may be hidden"
+
+
+def test_furniture_blocks_if_it_is_large_and_cuts_nothing():
+    table, cup = ([2, 2, 0], [4, 3, 1]), ([1, 1, 0], [1.1, 1.1, 0.1])
+    wall = random_solids.box([0, 0, 0], [0.2, 5, 3])
+    meshes = [wall, random_solids.box(*table), random_solids.box(*cup)]
+    roles = [Role.OCCLUDER, Role.DETAIL, Role.DETAIL]
+    model = PreparedModel(random_solids.scene_of_meshes(meshes, roles))
+    top = [round(table[1][2] / GRID_M), round(cup[1][2] / GRID_M)]
+    cuts, blocks = (set(planes.boxes[2][:, 0, 2].tolist()) for planes in (model.planes, model.blocking_planes))
+    assert not cuts & set(top) and top[0] in blocks and top[1] not in blocks
+    assert [object_id for object_id, _ in model.closed_of(Role.DETAIL)] == [1, 2]
+    assert [object_id for object_id, _ in model.closed_of(Role.OCCLUDER)] == [0]
+    for boxes in model.blocking_planes.boxes:
+        axis = int((boxes[:, 0] == boxes[:, 1]).all(axis=0).argmax()) if len(boxes) else 0
+        assert (np.diff(boxes[:, 0, axis]) >= 0).all(), "ordered by plane, as the index wants them"
+
+
+def test_outlines_are_the_rectangles_of_regions_then_the_patches():
+    model = PreparedModel(random_solids.random_solids(4))
+    boxes, patches, outlines = model.regions.boxes, model.patches, model.outlines
+    assert len(outlines.area) == len(boxes) + len(patches.area)
+    np.testing.assert_array_equal(outlines.boxes[: len(boxes)], boxes)
+    np.testing.assert_array_equal(outlines.boxes[len(boxes) :], patches.boxes)
+
+
+@pytest.mark.parametrize("part", [no_regions(), no_patches()])
+def test_nothing_hides_nothing(part):
+    assert len(part.boxes) == 0
+
+
+def test_an_empty_scene_can_be_prepared():
+    model = PreparedModel(Scene([], []))
+    assert len(model.regions.boxes) == len(model.patches.area) == len(model.outlines.area) == len(model.closed) == 0
+    assert len(model.occludees.pieces) == 0
