@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 
 from ...data.buildings.office import make_office
-from ...data.prepared import PreparedModel
 from ...kernels.launch import Device
 from ...kernels.select import launch_select
 from ...kernels.shaft import launch_shaft
@@ -16,7 +15,7 @@ from ...kernels.shields import device_shields
 from ...solvers.visibility.aim import Sights
 from ...solvers.visibility.graph_engine import GraphEngine
 from ...solvers.visibility.occluders import OccluderModel, seen_objects
-from .rows.objects import PIECES, SMALLEST, boxes_in_spaces
+from .rows.objects import PIECES, SMALLEST, boxes_in_spaces, prepared
 from .rows.portals import random_rooms
 from .rows.solvers import knapsacks
 from .suite import clock
@@ -98,7 +97,7 @@ def shaft_growth(device: Device, advance: Callable[[], None]) -> list[Growth]:
     counts, ms = {"occluders": []}, []
     for floors, rooms in OFFICES:
         scene = make_office(floors=floors, rooms_per_side=rooms, seed=4)
-        model = PreparedModel(scene)
+        model = prepared(scene)
         shields = device_shields(model.regions, model.patches, device)
         random = np.random.default_rng(0)
         boxes = [boxes_in_spaces(random, PAIRS, sides, scene) for sides in ((0.5, 1.5), (0.1, 0.6))]
@@ -116,7 +115,7 @@ def occlusion_growth(device: Device, advance: Callable[[], None]) -> list[Growth
     for floors, rooms in OFFICES:
         scene = make_office(floors=floors, rooms_per_side=rooms, seed=4)
         cells = boxes_in_spaces(np.random.default_rng(0), VIEW_CELLS, (1.0, 2.0), scene)
-        model = OccluderModel.of(Sights.of(PreparedModel(scene), cells, 0, device))
+        model = OccluderModel.of(Sights.of(prepared(scene), cells, 0, device))
         ms.append(median_ms(partial(seen_objects, model, np.arange(VIEW_CELLS)), device))
         counts["objects"].append(len(scene.objects))
         counts["triangles"].append(len(scene.triangles()[0]))

@@ -38,6 +38,13 @@ def office() -> Scene:
     return make_office(floors=FLOORS, rooms_per_side=ROOMS, seed=4)
 
 
+def prepared(scene: Scene) -> PreparedModel:
+    """A model whose furniture hides by its sections alone: as in 0.1.0, so that times compare."""
+    model = PreparedModel(scene)
+    model.blocking_planes = model.planes
+    return model
+
+
 @cache
 def opaque_triangles() -> tuple[np.ndarray, np.ndarray]:
     """The office's opaque triangles and their owners."""
@@ -106,7 +113,7 @@ def numpy_backface(triangles: np.ndarray, cell: np.ndarray) -> int:
 def shaft_cases(n: int, device: Device) -> list[Case]:
     """N pairs of a view cell and a small box, each in a room; judged by exact segments from outside all solids."""
     random = np.random.default_rng(n)
-    model = PreparedModel(office())
+    model = prepared(office())
     shields = device_shields(model.regions, model.patches, device)
     boxes = np.concatenate([boxes_in_spaces(random, n, (0.5, 1.5)), boxes_in_spaces(random, n, (0.1, 0.6))])
     rows = np.arange(2 * n).reshape(2, n).T
