@@ -67,10 +67,3 @@ def test_twin_exists_and_is_compared(launcher):
     assert hasattr(import_module(f"viewcell.kernels.{file}"), launcher)
     assert hasattr(import_module(f"viewcell.verify.{module}"), name)
     assert {launcher, name} <= names_in(ROOT / "tests" / test), f"{test} does not compare {launcher} with {twin}"
-
-
-def test_twins_share_no_code_with_kernels():
-    for path in (ROOT / "verify").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom):
-                assert "kernels" not in (node.module or ""), f"{path} imports {node.module}"
