@@ -4,6 +4,8 @@ import numpy as np
 from viewcell.data.patches import Patches, find_patches
 from viewcell.verify.exact.umbra import occluder
 
+LIMIT = 2**24
+
 
 def surface(columns, rows, position):
     """Triangles of a snapped grid of quadrilaterals, position(u, v) in grid steps."""
@@ -82,3 +84,26 @@ def area_of(corners):
 def bent_quadrilateral(height):
     triangles = surface(1, 1, lambda u, v: (u * 100, v * 100, height * u * v))
     return find_patches(triangles, np.zeros(2), least_area=1.0, cos_limit=0.2, axial=True)
+
+
+def at_the_border(rng, cell, outline):
+    """A scene as large as the grid, or as it is and at the grid's border; with its exact occluder."""
+    low, high = (f(np.concatenate([cell, outline]), axis=0) for f in (np.min, np.max))
+    if rng.random() < 0.6:
+        cell, outline = ((LIMIT - 1) // max(-low.min(), high.max()) * part for part in (cell, outline))
+    else:
+        away = np.where(rng.random(3) < 0.5, LIMIT - 1 - high, 1 - LIMIT - low)
+        cell, outline = cell + away, outline + away
+    return cell, outline, occluder(cell.tolist(), outline.tolist())
+
+
+def bent_scenes():
+    """Bent outlines and cells; in the last ones, which are mirror images, the separating planes bind."""
+    bent = bent_quadrilateral(60)
+    for side in (-1, 1):
+        middle = np.round(bent.boxes[0].mean(axis=0) + side * bent.normal[0] * 90).astype(int)
+        yield bent, np.stack([middle - 12, middle + 12])
+    for signs in ([1, 1, 1], [-1, 1, 1], [1, -1, 1], [1, 1, -1], [-1, -1, -1]):
+        a, b, c, d = np.array([[-38, 86, 35], [97, 23, -74], [30, 39, 60], [-78, 63, 72]]) * signs
+        steep = find_patches(np.array([[a, b, c], [a, c, d]]), np.zeros(2), least_area=1.0, cos_limit=0.05, axial=True)
+        yield steep, np.sort(np.array([[14, 88, -1], [19, 91, 6]]) * signs, axis=0)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 from builders import random_solids
 from viewcell.data.graph import OTHER_AXES
 from viewcell.data.prepared import PreparedModel
@@ -56,6 +57,36 @@ def test_every_point_of_a_region_is_opaque(seed):
     regions = regions_of(scene)
     assert len(regions.axis)
     assert len(open_points(scene, regions, np.random.default_rng(seed))) == 0
+
+
+def prism(outline):
+    """A solid of some corners (x, y) [m], 3 m high."""
+    return trimesh.creation.extrude_triangulation(*outline, 3.0)
+
+
+@pytest.mark.filterwarnings("ignore:Arrays of 2-dimensional vectors")
+@pytest.mark.parametrize("axis", range(3))
+def test_what_is_no_box_is_opaque_where_it_is_only(axis):
+    """A wall of L shape, and a box of which an edge is cut off although all eight corners are there."""
+    corners = np.array([[0, 0], [4, 0], [4, 0.5], [0.5, 0.5], [0.5, 4], [0, 4]], float)
+    wall = prism((corners, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]])))
+    cut = random_solids.box([6, 0, 0], [9, 3, 3])
+    edge = np.flatnonzero((cut.vertices[:, 1] == 0) & (cut.vertices[:, 2] == 0))
+    beside = [face for face in cut.faces.tolist() if set(edge) <= set(face)]
+    (a, b), (c, d) = edge, [next(v for v in face if v not in edge) for face in beside]
+    rest = [face for face in cut.faces.tolist() if face not in beside]
+    for new in ([[a, c, d], [d, c, b]], [[a, d, c], [d, b, c]]):
+        if trimesh.Trimesh(cut.vertices, rest + new, process=False).is_winding_consistent:
+            cut.faces = rest + new
+    assert wall.is_watertight and cut.is_watertight and len(cut.faces) == 12 and cut.volume == 27 - 4.5
+    for mesh in (wall, cut):
+        mesh.vertices = np.roll(mesh.vertices, axis, axis=1)
+    scene = random_solids.scene_of_meshes([wall, cut])
+    regions = regions_of(scene)
+    # The wall is cut from its foot to its head, and what is below or above is not.
+    heights = regions.plane[regions.axis == (2 + axis) % 3]
+    assert {0, 3072} <= set(heights.tolist()) and heights.min() == 0 and heights.max() == 3072
+    assert len(open_points(scene, regions, np.random.default_rng(0))) == 0
 
 
 def test_section_of_a_crossing_wall_closes_the_gap_in_a_face():

@@ -1,5 +1,6 @@
 """Cells, portals, dead cells and inhabitable cells: exact invariants in integers, and the traps that were met."""
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise, product
 
@@ -12,7 +13,7 @@ from viewcell.data.graph import OTHER_AXES, CellGraph
 from viewcell.data.inhabit import find_inhabitable
 from viewcell.data.opaque import opaque_planes
 from viewcell.data.portals import find_portals, open_rectangles, shared_faces
-from viewcell.data.scene import GRID_M
+from viewcell.data.scene import GRID_M, Space
 from viewcell.data.solids import (
     SolidIndex,
     closed_elements,
@@ -266,6 +267,37 @@ def test_solids_agree_with_the_exact_twin(seed):
     assert (got == truth).mean() > 0.99 and 50 < truth.sum() < 750
 
 
+def blunt_tetrahedron(rng):
+    """One of whose corners none is a needle."""
+    while True:
+        corners = rng.integers(-60, 60, (4, 3))
+        if abs(np.linalg.det((corners[1:] - corners[0]).astype(float))) > 60_000:
+            return tetrahedron(corners)
+
+
+def on_surface(rng, triangles, count):
+    """Corners, points of edges and points of faces, in quarters."""
+    weights = rng.choice([[4, 0, 0], [1, 3, 0], [2, 2, 0], [0, 2, 2], [2, 1, 1], [1, 2, 1], [1, 1, 2]], count) / 4
+    return np.einsum("nk,nki->ni", weights, triangles[rng.integers(0, len(triangles), count)].astype(float))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_lies_on_a_solid_is_not_outside(seed):
+    """Half or a quarter of the way round is on it; boxes up to the size of the grid, and points beside them."""
+    rng = np.random.default_rng(seed)
+    parts = [blunt_tetrahedron(rng) * 4 for _ in range(2)]
+    size = int(rng.choice([4, 2**17])) if seed % 2 else 4
+    parts += [box(low * size, (low + rng.integers(5, 60, 3)) * size) for low in rng.integers(-60, 40, (2, 3))]
+    triangles, owners = scene_of([(part, "occluder") for part in parts[2 * (seed % 2) :]]).triangles()
+    points = on_surface(rng, triangles, 600)
+    points = np.concatenate([points, points + rng.choice([-1, 0, 1], points.shape)])
+    solids = [(n, triangles[owners == n]) for n in np.unique(owners)]
+    got = SolidIndex(np.array([[points.min(axis=0) - 1, points.max(axis=0) + 1]]), solids).outside(points, 0)
+    truth = Sightlines(triangles, owners).outside_solids(points)
+    assert not (got & ~truth).any(), "called outside, but is on or inside"
+    assert got.sum() > 0.8 * truth.sum() > 100 and (~truth).sum() > 600
+
+
 def test_winding_number_of_a_solid_turned_inside_out():
     points = np.array([[5.0, 5.0, 5.0], [20.0, 5.0, 5.0]])
     outward = winding_numbers(points, box((0, 0, 0), (10, 10, 10)))
@@ -318,6 +350,48 @@ def test_inhabitable_by_rooms():
     assert found.names[found.mask].tolist() == ["room 0"] and "rooms" in found.reason
 
 
+def bare_graph(cells):
+    """Cells without portals."""
+    count, none = len(cells), np.zeros((0, 2), np.int32)
+    names = np.full(count, "", object)
+    return CellGraph(
+        np.array(cells, np.int32), np.zeros(count, bool), names, none, np.zeros(0, np.int8), none.reshape(0, 2, 3)
+    )
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_cell_belongs_to_a_room_that_holds_more_than_half_of_it(axis):
+    """Rooms that hold a quarter, a half and three quarters of a cell of 4 m; and two that hold a half each."""
+    cells, rooms = [], []
+    for place, quarters in enumerate((1, 2, 3)):
+        low = np.array([0, 0, 0]) + 10 * METRE * place * np.eye(3, dtype=int)[axis - 1]
+        high = low + 4 * METRE
+        cells.append([low, high])
+        rooms.append((low - 500, np.where(np.arange(3) == axis, low + quarters * METRE, high + 500)))
+    low, high = cells[0] = np.array(cells[0]) - 20 * METRE
+    halfway = np.where(np.arange(3) == axis, low + 2 * METRE, high)
+    rooms = [rooms[1], rooms[2], (low, halfway), (np.where(np.arange(3) == axis, halfway, low), high + 1)]
+    cells.append(np.array(cells[1]) + 40 * METRE)
+    rooms.append((cells[-1][0] - 500, np.where(np.arange(3) == axis, cells[-1][0] + METRE, cells[-1][1] + 500)))
+    found = find_inhabitable(room_scene(rooms=rooms), bare_graph(cells))
+    np.testing.assert_array_equal(found.mask, [True, False, True, False])
+    assert found.names.tolist()[1:] == ["", "room 1", ""] and found.names[0] in ("room 2", "room 3")
+
+
+def test_a_room_that_is_no_box_holds_what_is_inside_it():
+    """A room round a corner, whose box holds a cell that it does not."""
+    scene = room_scene()
+    corner = 8 * METRE * np.array([(0, 0), (1, 0), (1, 0.5), (0.5, 0.5), (0.5, 1), (0, 1)])
+    flat = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)]
+    low, high = (np.column_stack([corner, np.full(6, z)]) for z in (0, 4 * METRE))
+    faces = [face[::-1] for face in flat] + [tuple(6 + k for k in face) for face in flat]
+    for k in range(6):
+        faces += [(k, (k + 1) % 6, 6 + (k + 1) % 6), (k, 6 + (k + 1) % 6, 6 + k)]
+    scene.spaces = [Space("corner", np.concatenate([low, high]) * GRID_M, np.array(faces, np.int32))]
+    cells = METRE * np.array([[[0, 0, 0], [4, 4, 4]], [[4, 0, 0], [8, 4, 4]], [[4, 4, 0], [8, 8, 4]]])
+    np.testing.assert_array_equal(find_inhabitable(scene, bare_graph(cells)).mask, [True, True, False])
+
+
 def test_inhabitable_by_flooding_when_no_room_is_named():
     scene = room_scene()
     graph = room_graph(scene)
@@ -337,6 +411,22 @@ def test_inhabitable_with_a_shut_opening_and_with_a_leak():
     shut = find_inhabitable(scene, graph)
     assert "not reached from outside" in shut.reason and shut.mask.any()
     assert (graph.cells[shut.mask][:, 0] >= 0).all() and (graph.cells[shut.mask][:, 1, 0] <= 4 * METRE).all()
+
+
+def test_a_flooded_room_is_large_and_has_an_opening():
+    """Outside, a room behind a door, the inside of a wall, a cupboard with a door, and a shed that stands open."""
+    ends = [-4, 0, 4, 8, 8.375, 12]
+    cells = [[[a * METRE, 0, 0], [b * METRE, 4 * METRE, 3 * METRE]] for a, b in pairwise(ends)]
+    pairs, planes = [(0, 1), (3, 4), (0, 4)], [0, 8.375, 12]
+    flat = np.array([[[x * METRE, 0, 0], [x * METRE, METRE, 2 * METRE]] for x in planes], np.int32)
+    graph = replace(
+        bare_graph(cells), portal_cells=np.array(pairs, np.int32), portal_axis=np.zeros(3, np.int8), portals=flat
+    )
+    scene = room_scene()
+    scene.openings = np.array([[[x - 0.125, 0, 0], [x + 0.125, 1, 2]] for x in planes[:2]])
+    found = find_inhabitable(scene, graph)
+    assert "not reached from outside" in found.reason
+    np.testing.assert_array_equal(found.mask, [False, True, False, False, False])
 
 
 def test_trap_sliver_of_a_room_is_not_inhabitable():

@@ -1,5 +1,7 @@
 """View cells from tables and octrees."""
 
+from itertools import combinations
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -93,6 +95,10 @@ def test_octree_covers_the_model_and_its_octants_tile_it(room):
     sizes = (children[:, 1] - children[:, 0]).astype(float).prod(axis=1).reshape(-1, 8)
     np.testing.assert_array_equal(sizes.sum(axis=1), (roots[:, 1] - roots[:, 0]).astype(float).prod(axis=1))
     families = children.reshape(-1, 8, 2, 3)
+    # Of one size in all and without overlap: they leave nothing out.
+    for a, b in combinations(range(8), 2):
+        shared = np.minimum(families[:, a, 1], families[:, b, 1]) - np.maximum(families[:, a, 0], families[:, b, 0])
+        assert (shared <= 0).any(axis=1).all()
     assert (families[:, :, 0] >= roots[:, None, 0]).all() and (families[:, :, 1] <= roots[:, None, 1]).all()
 
 

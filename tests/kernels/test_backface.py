@@ -1,5 +1,7 @@
 """Back-face culling by normal cones against exact integers, triangle by triangle."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 import trimesh
@@ -11,6 +13,7 @@ from viewcell.data.scene import Definition, Instance, Mesh, Role, Scene
 from viewcell.data.solids import closed_elements
 from viewcell.kernels.backface import LEAF_SIZE, build_cones, integer_normals, launch_backface
 from viewcell.kernels.launch import Device
+from viewcell.verify.arithmetic import cross, dot
 from viewcell.verify.exact.backface import back_facing, outward_triangles
 from viewcell.verify.rays.embree import embree_scene
 
@@ -161,6 +164,22 @@ def test_hierarchies_hold_what_they_should():
             assert cones.links[child + 1][1] == after
     assert narrow > len(cones.ranges) / 2
     assert (cones.owners[cones.ranges[cones.roots[cones.roots >= 0], 0]] == np.flatnonzero(cones.roots >= 0)).all()
+
+
+def test_cones_hold_their_normals_exactly():
+    """In rationals: the sine is rounded up, not to the nearest."""
+    cones, looked_at = cones_of(scene_of(icosphere(3000, subdivisions=2), icosphere(2**23, subdivisions=2))), 0
+    normals = integer_normals(cones.triangles).tolist()
+    for (first, last), cone in zip(cones.ranges.tolist(), cones.cones, strict=True):
+        *axis, sine = (Fraction(x) for x in cone.tolist())
+        if sine > 1:
+            continue
+        looked_at += 1
+        for n in normals[first:last]:
+            assert dot(axis, n) > 0
+            across = cross(axis, n)
+            assert dot(across, across) <= sine * sine * dot(n, n) * dot(axis, axis)
+    assert looked_at > 100
 
 
 def test_no_ray_from_outside_meets_a_removed_triangle_first():

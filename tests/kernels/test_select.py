@@ -211,6 +211,18 @@ def test_everything_fits():
         assert (found.price == 0).all() and (found.gap < 1e-14).all()
 
 
+@pytest.mark.parametrize("budget", [3000, 5000])
+def test_small_benefits_beside_a_large_one_are_not_lost(budget):
+    """Each is below half a unit in the last place of the sum so far."""
+    benefits = np.tile([0.0, 1.0], 4001)
+    benefits[1] = 2.0**54
+    costs, starts = np.tile([0, 1], 4001), np.arange(0, 8003, 2)
+    found = launch_select(benefits[None], costs, starts, budget)
+    most = Fraction(2**54 + min(budget, 4001) - 1)
+    assert most <= Fraction(found.bound[0]) <= most * (1 + Fraction(1, 2**47))
+    assert abs(Fraction(found.value[0]) - most) <= 4
+
+
 def test_nothing_fits():
     """The cheapest level of each object, of equals the best, then the first."""
     found = launch_select([[1, 9, 4, 9, 3, 5]], [2, 1, 1, 1, 3, 2], [0, 4, 6], 2)

@@ -206,6 +206,21 @@ def test_an_optimum_behind_an_occluder_is_rejected_for_the_centre():
     assert cone_point(box_problem(40.0, 30.0)).status[0] == Status.REJECTED
 
 
+def test_a_row_left_out_is_kept_to_rounding():
+    """Of more rows than are at work at once: one that the optimum violates by less than what would put it to work."""
+    idle, wall, tight = np.tile([0.0, 0, 1], (60, 1)), np.tile([-1.0, 0, 0], (8, 1)), np.array([[-0.5, 0, 0]])
+    rows, bounds = (
+        np.concatenate([idle, wall, tight, wall]),
+        [*np.linspace(-2, -1, 60), *[-20.0] * 8, -10 + 2e-9, *[-21.0] * 8],
+    )
+    problem = box_problem(40.0, 1e9, rows=rows, bounds=bounds)
+    loose = replace(problem, bounds=np.where(problem.bounds == -10 + 2e-9, -11, problem.bounds))
+    assert (problem.rows @ solve_points([loose]).point[0] < problem.bounds - 1e-10).any()
+    found = solve_points([problem])
+    assert found.status[0] == Status.SOLVED and found.primal[0] <= 1e-15
+    assert (problem.rows @ found.point[0] >= problem.bounds - 1e-14).all()
+
+
 def test_rows_that_leave_nothing_are_reported():
     impossible = box_problem(0.0, 30.0, rows=[[1.0, 0, 0], [-1.0, 0, 0]], bounds=[5.0, 19.0])
     result = solve_points([impossible, box_problem(20.0, 30.0)])

@@ -8,8 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from builders import small_house
-from builders.places import SHARED
+from builders import corridors, small_house
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.graph import OTHER_AXES, CellGraph
@@ -18,7 +17,9 @@ from viewcell.data.verdict import Verdict
 from viewcell.verify.cases.case_file import WrongHidden, load_cases, read_case, write_case
 from viewcell.verify.exact.sightline import Sightlines
 from viewcell.verify.exact.trace import contact_links, portal_links
-from viewcell.verify.rays.adjudicate import Judgement
+from viewcell.verify.findings import VerifyResult
+from viewcell.verify.proofs.certified import Certified
+from viewcell.verify.rays.adjudicate import Judge, Judgement
 from viewcell.verify.rays.starts import aim_points, cell_origins, frontier_points
 from viewcell.workbench import verify as workbench_verify
 from viewcell.workbench.bake.run import bake
@@ -115,6 +116,16 @@ def test_every_planted_hidden_object_is_found(house, target):
     assert not again.ok and again.line().startswith("wrong-hidden: cell 2, object")
 
 
+@pytest.mark.parametrize(("kind", "target"), [("cell", 4), ("object", 4), ("object", 17), ("object", 18)])
+def test_even_rays_find_what_is_planted(house, kind, target, monkeypatch):
+    """Alone: the guided rays are left out. The last is the pane, which stops no ray."""
+    monkeypatch.setattr(workbench_verify, "_hunt", lambda *_: None)
+    (house.potential_cells if kind == "cell" else house.potential_objects)[2, target] = False
+    result = verify_bake(house, rays=RAYS)
+    case = read_case(result.case)
+    assert result.wrong_hidden == 1 and (case.cell, case.kind, case.target) == (2, kind, target)
+
+
 @pytest.mark.parametrize("kind", ["cell", "object"])
 def test_guided_rays_find_what_is_planted(house, kind, monkeypatch):
     """Alone: the even rays are left out."""
@@ -124,6 +135,18 @@ def test_guided_rays_find_what_is_planted(house, kind, monkeypatch):
     assert result.wrong_hidden == 1 and not result.ok and "confidence" not in result.table()
     case = read_case(result.case)
     assert (case.cell, case.kind, case.target) == (2, kind, 4) and not replay(result.case, house).ok
+
+
+@pytest.mark.parametrize("hidden", [True, False])
+@pytest.mark.parametrize(("y", "judgement"), [(640, "VISIBLE"), (961, "BLOCKED"), (960, "GRAZE")])
+def test_a_case_is_fixed_unless_it_is_hidden_and_visible(hidden, y, judgement, house):
+    """A line of sight that something else stops now accuses no more."""
+    house.potential_cells[0, 2] = not hidden
+    case = WrongHidden(str(house.folder), "", 0, "cell", 2, (2500.0, float(y), 640.0), (1100.0, 0.0, 0.0))
+    again = replay(write_case(case), house)
+    assert again.judgement is Judgement[judgement] and again.hidden == hidden
+    assert again.ok == (not hidden or judgement != "VISIBLE")
+    assert again.line().startswith("fixed" if again.ok else "wrong-hidden")
 
 
 def test_verify_says_how_sure_it_is(house, bare):
@@ -158,6 +181,30 @@ def test_a_crack_is_a_leak_below_the_seal(house):
     assert result.leaks > 0
 
 
+@pytest.mark.parametrize("outcome", [Judgement.GRAZE, Judgement.LEAK, Judgement.BLOCKED])
+def test_only_what_the_judge_calls_visible_accuses(outcome, house, monkeypatch):
+    house.potential_cells[0, 4] = house.potential_objects[0, 17] = False
+    monkeypatch.setattr(Judge, "judge", lambda *_: outcome)
+    result = verify_bake(house, rays=RAYS)
+    assert (result.grazes + result.leaks + result.blocked > 0) and result.wrong_hidden == 0
+    assert result.ok and result.case is None
+    counts = {Judgement.GRAZE: result.grazes, Judgement.LEAK: result.leaks, Judgement.BLOCKED: result.blocked}
+    assert [kind for kind, count in counts.items() if count] == [outcome]
+
+
+@pytest.mark.parametrize(
+    "fault", ["wrong_hidden", "cell_witnesses", "object_witnesses", "failed_proofs", "failed_occluders", "uncovered"]
+)
+def test_each_finding_alone_is_enough(fault):
+    result = VerifyResult(certificates=Certified(3))
+    assert result.ok
+    if fault.endswith("witnesses"):
+        getattr(result, fault).count[5] = 1
+    else:
+        setattr(result if fault == "wrong_hidden" else result.certificates, fault, 1)
+    assert not result.ok
+
+
 def test_grazes_are_not_violations(house):
     judge = make_judge(house)
     along_edge = np.array([2500.0, 960.0, 640.0]), np.array([3600.0, 960.0, 640.0])
@@ -182,6 +229,19 @@ def test_an_object_is_seen_only_before_all_others(house):
     assert look(12, 9) is Judgement.VISIBLE
     assert look(17, 9) is Judgement.GRAZE
     assert look(17, 3, start=63) is Judgement.BLOCKED, "from inside the desk"
+
+
+@pytest.mark.parametrize("kind", ["house", "bare"])
+def test_every_witness_is_looked_at(kind, request, monkeypatch):
+    """A few at a time; a false one wherever it stands."""
+    bake = request.getfixturevalue(kind)
+    monkeypatch.setattr(workbench_verify, "CHUNK", 5)
+    true, whole = bake.cell_to_cell, bake.potential_cells.sum()
+    assert verify_bake(bake, rays=0).cell_witnesses.confirmed == whole
+    for row in (0, 4, 5, len(true) - 1):
+        bake.cell_to_cell = changed(true, row, origin_x=-1.0)
+        found = verify_bake(bake, rays=0).cell_witnesses
+        assert (found.refuted, found.confirmed) == (1, whole - 1)
 
 
 @pytest.mark.parametrize("kind", ["house", "bare"])
@@ -321,9 +381,7 @@ def test_bad_arguments(house, tmp_path):
 
 
 def graph_of(folder):
-    """A shared cell graph on a grid of 1/32 m."""
-    if not folder.exists():
-        pytest.skip(f"no shared graphs folder {folder.name}")
+    """A cell graph of a folder on a grid of 1/32 m."""
     cells, portals = (pq.read_table(folder / f"{name}.parquet") for name in ("cells", "portals"))
     box = np.array([[cells[f"{side}_{a}"].to_numpy() for a in "xyz"] for side in ("min", "max")])
     axis = portals["axis"].to_numpy().astype(np.int8)
@@ -341,9 +399,10 @@ def graph_of(folder):
     )
 
 
-def test_rays_through_a_building_stay_in_the_transitive_closure(bare):
-    """All cells within reach of portals are potential: no ray may leave them, and rays reach most of 38 cells."""
-    graph = graph_of(SHARED / "graphs" / "w48")
+@pytest.mark.parametrize(("name", "visible"), [("office", 23.4), ("w48", 38.6)])
+def test_rays_through_a_building_stay_in_the_transitive_closure(bare, name, visible, tmp_path):
+    """All cells within reach of portals are potential: no ray may leave them; most of the visible ones are reached."""
+    graph = graph_of(corridors.graph_folder(name, tmp_path))
     reach = np.eye(graph.cell_count, dtype=bool)
     low, high = graph.portal_cells.T
     reach[low, high] = reach[high, low] = True
@@ -355,7 +414,7 @@ def test_rays_through_a_building_stay_in_the_transitive_closure(bare):
     bake = dataclasses.replace(bake, potential_objects=np.zeros((graph.cell_count, 0), bool))
     result = verify_bake(bake, rays=200_000)
     assert result.wrong_hidden == 0 and result.blocked == 0
-    assert 20 < sum(c.by_rays for c in result.counts[:2]) / graph.inhabitable.sum() <= 38.6
+    assert visible / 2 < sum(c.by_rays for c in result.counts[:2]) / graph.inhabitable.sum() <= visible
 
 
 def columns_of(printed):
@@ -364,13 +423,15 @@ def columns_of(printed):
     return dict(zip(head, row, strict=True))
 
 
-def test_bench_of_a_bare_graph(capsys, tmp_path):
-    if not (SHARED / "graphs" / "w48").exists():
-        pytest.skip("no shared graphs folder w48")
-    assert benches.main(["flood", str(SHARED / "graphs" / "w48"), "--repeats", "1"]) == 0
+@pytest.mark.parametrize(
+    ("name", "numbers", "cut"),
+    [("office", ("43", "70", "234"), "10 of 10, 0 cut"), ("w48", ("182", "236", "6,994"), "182 of 182, 0 cut")],
+)
+def test_bench_of_a_bare_graph(name, numbers, cut, capsys, tmp_path):
+    assert benches.main(["flood", str(corridors.graph_folder(name, tmp_path)), "--repeats", "1"]) == 0
     row = columns_of(capsys.readouterr().out)
-    assert (row["cells"], row["portals"], row["ordered pairs"]) == ("182", "236", "6,994")
-    assert row["unknown"] == row["asymmetric pairs"] == "0" and row["its sources, cut"] == "182 of 182, 0 cut"
+    assert (row["cells"], row["portals"], row["ordered pairs"]) == numbers
+    assert row["unknown"] == row["asymmetric pairs"] == "0" and row["its sources, cut"] == cut
     assert benches.main(["flood", str(tmp_path)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 

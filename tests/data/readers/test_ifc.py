@@ -6,6 +6,7 @@ from viewcell.data.errors import InputError
 from viewcell.data.readers import read
 from viewcell.data.readers.roles import ifc_role, named_role
 from viewcell.data.scene import GRID_M, Role, Scene
+from viewcell.data.store.scene_folder import read_scene, write_scene
 
 
 def by_name(scene: Scene) -> dict[str, tuple[str, Role]]:
@@ -78,15 +79,29 @@ class Step:
         self.lines.append(f"#{len(self.lines) + 1}={text};")
         return f"#{len(self.lines)}"
 
-    def shape(self, size: tuple) -> str:
+    def solid(self, size: tuple, transparency: float | None = None) -> str:
+        """A box, in a colour that lets so much light pass."""
         x, y, z = (float(length) for length in size)
         profile = self.add(f"IFCRECTANGLEPROFILEDEF(.AREA.,$,#8,{x},{y})")
         solid = self.add(f"IFCEXTRUDEDAREASOLID({profile},#4,#9,{z})")
-        return self.add(f"IFCSHAPEREPRESENTATION(#5,'Body','SweptSolid',({solid}))")
+        if transparency is not None:
+            colour = self.add("IFCCOLOURRGB($,0.5,0.6,0.7)")
+            through = f"{colour},{transparency:.4f},$,$,$,$,$,$,.NOTDEFINED."
+            style = self.add(f"IFCSURFACESTYLERENDERING({through})")
+            style = self.add(f"IFCSURFACESTYLE('paint',.BOTH.,({style}))")
+            if self.schema.upper().startswith("IFC2"):
+                style = self.add(f"IFCPRESENTATIONSTYLEASSIGNMENT(({style}))")
+            self.add(f"IFCSTYLEDITEM({solid},({style}),$)")
+        return solid
 
-    def box(self, kind: str, name: str, middle: tuple, size: tuple, more: str = ",$") -> str:
+    def shape(self, size: tuple, *transparencies: float | None) -> str:
+        """A representation of boxes side by side, one for each transparency, or a single one without a colour."""
+        solids = ",".join(self.solid(size, transparency) for transparency in transparencies or (None,))
+        return self.add(f"IFCSHAPEREPRESENTATION(#5,'Body','SweptSolid',({solids}))")
+
+    def box(self, kind: str, name: str, middle: tuple, size: tuple, more: str = ",$", paint: tuple = ()) -> str:
         """A product whose box stands on `middle`."""
-        shape = self.add(f"IFCPRODUCTDEFINITIONSHAPE($,$,({self.shape(size)}))")
+        shape = self.add(f"IFCPRODUCTDEFINITIONSHAPE($,$,({self.shape(size, *paint)}))")
         point = self.add("IFCCARTESIANPOINT((" + ",".join(str(float(x)) for x in middle) + "))")
         place = self.add(f"IFCLOCALPLACEMENT($,{self.add(f'IFCAXIS2PLACEMENT3D({point},$,$)')})")
         name = name if name == "*" else f"'{name}'"
@@ -115,6 +130,99 @@ def house(schema: str = "IFC2X3", wall_name: str = "wall") -> Step:
     step.box("IfcSlab", "slab", far + np.array([0, 2000, -300]), (4000, 4200, 300), ",$,.FLOOR.")
     step.box("IfcFurnishingElement", "chair", far + np.array([1000, 2000, 0]), (500, 500, 900))
     return step
+
+
+PAINTS = {
+    "none": ((), Role.OCCLUDER),
+    "opaque": ((0.0,), Role.OCCLUDER),
+    "nearly opaque": ((0.05,), Role.OCCLUDER),
+    "a little": ((0.06,), Role.TRANSPARENT),
+    "glass": ((0.8,), Role.TRANSPARENT),
+    "all of it": ((1.0,), Role.TRANSPARENT),
+    "first part": ((0.8, 0.0), Role.TRANSPARENT),
+    "last part": ((0.0, 0.8), Role.TRANSPARENT),
+    "beside what has none": ((None, 0.8), Role.TRANSPARENT),
+    "no part": ((0.0, 0.03, None), Role.OCCLUDER),
+}
+
+
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
+@pytest.mark.parametrize("paint", PAINTS)
+def test_what_is_glass_in_part_hides_nothing(tmp_path, paint, schema):
+    """By the colour of its surface, whatever its class: calling it opaque would hide what is seen through it."""
+    step, (transparencies, role) = house(schema), PAINTS[paint]
+    far = (500_000_000.0, 9000, 0)
+    step.box("IfcColumn", "column", far, (600, 600, 3000), ",$" if schema == "IFC2X3" else ",$,$", transparencies)
+    step.box("IfcFurnishingElement", "screen", (500_001_000.0, 9000, 0), (600, 60, 900), ",$", transparencies)
+    roles = by_name(read(step.write(tmp_path / "a.ifc")))
+    assert roles["column"] == ("IfcColumn", role)
+    assert roles["screen"][1] is (Role.DETAIL if role is Role.OCCLUDER else role)
+    assert roles["wall"][1] is Role.OCCLUDER
+
+
+def test_panes_of_a_curtain_wall_are_glass(tmp_path):
+    step = house()
+    panes = [step.box("IfcPlate", f"pane {n}", (500_000_000.0, 9000 + 900 * n, 0), (60, 800, 900)) for n in range(2)]
+    wall = step.add(f"IFCCURTAINWALL('{len(step.lines):022d}',$,'front',$,$,$,$,$)")
+    step.add(f"IFCRELAGGREGATES('{len(step.lines):022d}',$,$,$,{wall},({panes[0]}))")
+    roles = by_name(read(step.write(tmp_path / "a.ifc")))
+    assert roles["pane 0"] == ("IfcPlate", Role.TRANSPARENT) and roles["pane 1"] == ("IfcPlate", Role.OCCLUDER)
+
+
+def test_panes_that_say_they_are_panes_are_glass(tmp_path):
+    step = house("IFC4")
+    for number, kind in enumerate(("CURTAIN_PANEL", "SHEET")):
+        step.box("IfcPlate", kind, (500_000_000.0, 9000 + 900 * number, 0), (60, 800, 900), f",$,.{kind}.")
+    roles = by_name(read(step.write(tmp_path / "a.ifc")))
+    assert roles["CURTAIN_PANEL"][1] is Role.TRANSPARENT and roles["SHEET"][1] is Role.OCCLUDER
+
+
+def storey(schema="IFC2X3"):
+    """A row of rooms with walls, doors, windows, stools that share a shape, and a member."""
+    step = house(schema)
+    for n in range(1, 6):
+        at = np.array([500_000_000.0 + 6000 * n, 0, 0])
+        bay, room = at + np.array([2100, 0, 0]), at + np.array([0, 2000, 0])
+        wall = step.box("IfcWall", f"wall {n}", at, (4000, 200, 3000), ",$" if schema == "IFC2X3" else ",$,$")
+        for kind, place in (("IfcDoor", (-900, 0, 0)), ("IfcWindow", (900, 0, 1000))):
+            void = step.box("IfcOpeningElement", f"hole {n}", at + place, (900, 300, 1500))
+            filler = step.box(kind, f"{kind} {n}", at + place, (850, 60, 1450), ",$,$,$")
+            step.relate("IfcRelVoidsElement", wall, void)
+            step.relate("IfcRelFillsElement", void, filler)
+        step.box("IfcMember", f"post {n}", bay, (100, 100, 3000), ",$" if schema == "IFC2X3" else ",$,$")
+        step.box("IfcSpace", f"room {n}", room, (4000, 3800, 3000), ",$,.ELEMENT.,.INTERNAL.,$")
+    return step
+
+
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
+def test_a_storey_keeps_its_things_rooms_and_holes(schema, tmp_path, monkeypatch):
+    """Written and read again, or read by more threads, it is the same to the last digit; the file is not touched."""
+    path = storey(schema).write(tmp_path / "a.ifc")
+    before = path.read_bytes()
+    scene = read(path)
+    assert (len(scene.objects), len(scene.spaces), len(scene.openings), scene.skipped) == (4 + 5 * 4, 6, 11, [])
+    roles = {(placed.kind, placed.role.value) for placed in scene.objects}
+    assert {("IfcWindow", "transparent"), ("IfcDoor", "transparent"), ("IfcMember", "occluder")} <= roles
+    assert scene.max_snap_m() <= GRID_M / 2 and path.read_bytes() == before
+    write_scene(scene, tmp_path / "a.scene")
+    np.testing.assert_array_equal(read_scene(tmp_path / "a.scene").triangles()[0], scene.triangles()[0])
+    for cores in (1, 4):
+        monkeypatch.setattr("os.cpu_count", lambda cores=cores: cores)
+        again = read(path)
+        assert [placed.name for placed in again.objects] == [placed.name for placed in scene.objects]
+        np.testing.assert_array_equal(again.triangles()[0], scene.triangles()[0])
+    closed = {placed.kind: placed.role for placed in read(path, doors="closed").objects}
+    assert closed["IfcDoor"] is Role.OCCLUDER and closed["IfcWindow"] is Role.TRANSPARENT
+
+
+def test_an_unknown_schema_is_refused(tmp_path):
+    assert "IFC9" in refused(house("IFC9").write(tmp_path / "new.ifc"))
+
+
+def test_what_is_no_thing_is_no_object(tmp_path):
+    """Voids, annotations and rooms would hide what is behind them."""
+    names = by_name(read(house().write(tmp_path / "a.ifc")))
+    assert names.keys() == {"wall", "door", "slab", "chair"}
 
 
 def test_small_ifc_gives_everything(tmp_path):

@@ -165,6 +165,74 @@ def test_gltf_alpha_is_transparent(tmp_path):
     assert roles == {"solid": "occluder", "pale": "transparent", "blend": "transparent", "leaf": "transparent"}
 
 
+SEEN_THROUGH = [
+    "Glass",
+    "glazing",
+    "translucent sheet",
+    "Transparent_3",
+    "verre",
+    "glas",
+    "window 3",
+    "Fenster",
+    "fenêtre",
+]
+SEEN_THROUGH += ["fenetre", "7|IfcWindow|a", "7|IfcWindowStandardCase|a", "7|IfcCurtainWall|a", "7|IfcPlate|a"]
+SOLID = ["wall", "glastonbury", "outdoor", "7|IfcWall|glass", "7|IfcMember|a", "winding road"]
+
+
+@pytest.mark.parametrize("suffix", ["obj", "glb"])
+def test_names_say_what_is_seen_through(tmp_path, suffix):
+    """In any language of the list; an IFC class in a name outweighs its other words."""
+    names = SEEN_THROUGH + SOLID
+    if suffix == "obj":
+        path = write(tmp_path / "a.obj", SQUARE + "".join(f"g {name}\nf 1 2 3\n" for name in names))
+    else:
+        model, path = trimesh.Scene(), tmp_path / "a.glb"
+        for name in names:
+            model.add_geometry(CUBE, node_name=name, geom_name=f"shape {names.index(name)}")
+        model.export(path)
+    roles = {name: role for name, (_, role) in by_name(read(path)).items()}
+    assert [name for name in SEEN_THROUGH if roles[name] is not Role.TRANSPARENT] == []
+    assert [name for name in SOLID if roles[name] is not Role.OCCLUDER] == []
+
+
+@pytest.mark.parametrize("material", ["Glass", "some glazing", "verre", "TRANSPARENT"])
+def test_a_material_of_glass_outweighs_every_name(tmp_path, material):
+    body = "".join(f"g {name}\nusemtl {material}\nf 1 2 3\n" for name in ("wall", "7|IfcWall|a"))
+    path = write(tmp_path / "a.obj", SQUARE + "g solid\nf 1 2 3\n" + body)
+    assert [placed.role for placed in read(path).objects] == [Role.OCCLUDER, Role.TRANSPARENT, Role.TRANSPARENT]
+
+
+def test_anything_less_than_opaque_is_transparent(tmp_path):
+    """In 8 bits: the last step below opaque may be rounding, the one below it is not. Libraries add up."""
+    kinds = {
+        "d 1": 1,
+        "d 0.998": 1,
+        "d 0.99": 0,
+        "d 0": 0,
+        "Tr 0": 1,
+        "Tr 0.01": 0,
+        "Tr 0.9": 0,
+        "Tr 1": 0,
+        "d -halo 0.3": 0,
+    }
+    for half in (0, 1):
+        lines = [f"newmtl m{n}\n{kind}\n" for n, kind in enumerate(kinds) if n % 2 == half]
+        write(tmp_path / f"m{half}.mtl", "".join(lines))
+    body = "".join(f"g part{n}\nusemtl m{n}\nf 1 2 3\n" for n in range(len(kinds)))
+    path = write(tmp_path / "a.obj", "mtllib m0.mtl\nmtllib m1.mtl\n" + SQUARE + body)
+    assert [int(placed.role is Role.OCCLUDER) for placed in read(path).objects] == list(kinds.values())
+    model = trimesh.Scene()
+    for alpha in (255, 254, 253, 0):
+        mesh = CUBE.copy()
+        material = trimesh.visual.material.PBRMaterial(name="m", baseColorFactor=[9, 9, 9, alpha])
+        mesh.visual = trimesh.visual.TextureVisuals(material=material)
+        model.add_geometry(mesh, node_name=f"part{alpha}", geom_name=f"shape{alpha}")
+    model.export(tmp_path / "a.glb")
+    roles = {name: role for name, (_, role) in by_name(read(tmp_path / "a.glb")).items()}
+    assert {int(name[4:]) for name, role in roles.items() if role is Role.OCCLUDER} == {254, 255}
+
+
 def test_obj_syntax(tmp_path):
     text = "o a\nv 0 0 0 1 1 1\nv 1 0 0\nv 1 1 0\nvt 0 0\nvn 0 0 1\nf -3/1/1 -2//1 \\\n  3\n"
     text += "l 1 2\n# f 9 9 9\nf 1/1 2/1 3/1\n"

@@ -2,8 +2,8 @@ import struct
 
 import numpy as np
 import pytest
+from builders import corridors
 from builders.four_rooms import write_graph
-from builders.places import SHARED
 from viewcell import InputError, bake
 from viewcell.data.store.graph_folder import read_graph
 from viewcell.data.store.quake import UNIT_STEPS, axial_graph, is_axial, read_bsp, read_prt, write_prt
@@ -123,6 +123,12 @@ def test_check_finds_what_a_map_hides(rooms, tmp_path, oblique):
     assert "cell 3 sees cell 1" in result.table() and "units" in result.table()
 
 
+def test_a_line_that_rationals_do_not_confirm_accuses_nobody(rooms, tmp_path, monkeypatch):
+    monkeypatch.setattr(WindingLines, "path", lambda *_: None)
+    result = check(turned(rooms[1], tmp_path / "turned.prt"), np.eye(4, dtype=bool), rays=40_000)
+    assert result.ok and result.grazes > 0
+
+
 def test_sampled_lines_say_how_sure_they_are(rooms, tmp_path):
     result = check(turned(rooms[1], tmp_path / "turned.prt"), SEEN, rays=40_000)
     assert result.ok and "95 % confidence no leaf hides more than 0.04" in result.confidence_line()
@@ -139,16 +145,16 @@ def test_lines_prove_the_same_whichever_way_windings_run(rooms, tmp_path):
         assert {(a, b) for a, b, *_ in suspects} == {(a, b) for a, b in np.argwhere(SEEN) if a != b}
 
 
-def test_sampled_lines_stay_within_what_stabbing_proves(tmp_path):
-    graphs = SHARED / "graphs"
-    if not graphs.is_dir():
-        pytest.skip("needs the shared cell graphs, which are not part of the project")
-    graph, _ = read_graph(graphs / "w48")
-    write_prt(graph, tmp_path / "w48.prt")
-    truth = bake(graphs / "w48", tmp_path / "w48.bake").potential_cells
-    exact = check(tmp_path / "w48.prt", truth)
+@pytest.mark.parametrize("name", ["office", "w48"])
+def test_sampled_lines_stay_within_what_stabbing_proves(name, tmp_path):
+    folder = corridors.graph_folder(name, tmp_path)
+    graph, _ = read_graph(folder)
+    graph.inhabitable[:] = True
+    write_prt(graph, tmp_path / "map.prt")
+    truth = bake(corridors.write_graph(graph, tmp_path / "all"), tmp_path / "made.bake").potential_cells
+    exact = check(tmp_path / "map.prt", truth)
     assert exact.ok and np.array_equal(exact.seen["cell"], truth)
-    sampled = check(turned(tmp_path / "w48.prt", tmp_path / "turned.prt"), truth, rays=400_000)
+    sampled = check(turned(tmp_path / "map.prt", tmp_path / "turned.prt"), truth, rays=400_000)
     assert sampled.ok and not sampled.exact
     assert (sampled.seen["cell"] & truth).sum() > 0.6 * truth.sum()
 

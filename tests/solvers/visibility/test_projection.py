@@ -18,6 +18,8 @@ from viewcell.solvers.visibility.projection import (
     split_cell,
     vlod_hidden,
 )
+from viewcell.verify.arithmetic import box_corners
+from viewcell.verify.exact.umbra import occluder, umbra
 from viewcell.verify.rays.embree import embree_scene
 
 STEPS = 1024
@@ -159,6 +161,23 @@ def test_a_shell_keeps_a_bounded_umbra():
         for shells in (0, 1)
     ]
     assert answers == [False, True]
+
+
+@pytest.mark.parametrize("shells", [0, 1, 2, 5])
+def test_what_one_wall_hides_is_in_its_umbra_at_any_depth(shells):
+    """Walls smaller and larger than the cell, whose umbra ends or has no end, and boxes about where it ends."""
+    rng, count = np.random.default_rng(shells), np.zeros(2, int)
+    for side in rng.uniform(0.3, 1.2, 12):
+        low = (1 - side) / 2
+        outlines = wall(low, 1 - low)
+        exact = occluder([[0] * 3, [STEPS] * 3], outlines.corners.tolist())
+        corner = np.column_stack([rng.uniform(3.1, 12, 60), *rng.uniform(0.3, 0.7, (2, 60))])
+        boxes = (np.stack([corner, corner + 0.05], axis=1) * STEPS).astype(np.int32)
+        hidden = vlod_hidden(CELL, outlines, boxes, np.arange(60), replace(CENTRE, shells=shells))[0][0]
+        truth = np.array([all(umbra(exact, x) for x in box_corners(box.tolist())) for box in boxes])
+        assert not (hidden & ~truth).any(), "wrong-hidden"
+        count += hidden.sum(), truth.sum()
+    assert count[0] > 20
 
 
 def test_what_one_half_of_a_cell_sees_is_not_hidden():

@@ -39,6 +39,13 @@ CASES = load_hard_cases()
 # Kernels that take seconds.
 LONG = ("launch_shrink", "launch_occludees", "launch_deviation", "launch_raster", "vlod_hidden", "solve_points")
 LONG += tuple(f"bake {m}" for m in METHODS[1:])
+# Cases in which a kernel may withhold its answer, because they are on the edge of one; none where it is not named.
+MOST_WITHHELD = {
+    "launch_target_search": 1, "launch_line_trees": 1, "launch_confirm": 5, "launch_aim": 3, "launch_shaft": 7,
+    "launch_umbra": 51, "launch_shrink": 62, "launch_coverage": 20, "launch_occludees": 84, "launch_backface": 1,
+    "launch_select": 2, "launch_raster": 3, "bake portals": 5, "bake occluders": 1, "bake both": 1, "bake vlod": 1,
+    "vlod_hidden": 82, "solve_points": 162,
+}  # fmt: skip
 
 
 def polygons(shapes):
@@ -187,7 +194,8 @@ def test_models_far_away_are_read_with_their_digits():
 def test_no_kernel_is_wrong(kernel):
     (row,) = run_hard_cases(["cpu"], kernels=[kernel])
     assert not row.wrong
-    assert row.cases >= 15 and row.right > len(row.withheld) // 2
+    assert row.cases >= 15 and row.right == row.cases - len(row.withheld)
+    assert len(row.withheld) <= MOST_WITHHELD.get(kernel, 0), row.withheld
 
 
 def test_boxes_in_cube_maps():

@@ -96,6 +96,23 @@ def test_agrees_with_cramers_rule(seed, scale):
             assert found.get((s, t), 0) == expected, (points[:, s].tolist(), triangles[t].tolist())
 
 
+@given(st.integers(0, 2**32 - 1), st.sampled_from([5e-324, 1.4e-162, 1e-150, 1e-60]))
+def test_tiny_segments_about_a_corner_agree_with_cramers_rule(seed, scale):
+    """Products of their coordinates are lost below the least float64, or keep a few bits."""
+    rng = np.random.default_rng(seed)
+    triangles = rng.integers(-4, 5, (12, 3, 3))
+    triangles[:, 0] = 0
+    triangles = triangles[np.cross(triangles[:, 1], triangles[:, 2]).any(axis=1)]
+    points = rng.integers(-9, 10, (2, 8, 3)) * scale
+    found = np.zeros((8, len(triangles)), int)
+    segments, ids, kinds = Sightlines(triangles).hits(*points)
+    found[segments, ids] = kinds
+    for s, t in product(range(8), range(len(triangles))):
+        expected = rational_kind(points[0, s], points[1, s], triangles[t])
+        if expected is not None:
+            assert found[s, t] == expected, (points[:, s].tolist(), triangles[t].tolist())
+
+
 def test_many_triangles_agree_with_each_alone():
     rng = np.random.default_rng(5)
     centres = rng.integers(-3000, 3000, (700, 1, 3))
@@ -116,6 +133,13 @@ def test_closed_objects_alone_have_an_inside():
     points = [(1, 1, 1), (5, 5, 5), (0, 0, 0), (5, 5, 0), (25, 5, 5), (-1, 5, 5), (7, 7, 7), (0, 3, 4), (12, 12, 16)]
     expected = [False, False, False, False, True, True, False, False, True]
     assert Sightlines(triangles, owners).outside_solids(np.array(points, float)).tolist() == expected
+
+
+def test_a_solid_turned_inside_out_cancels_no_other():
+    """Each object is taken alone: in both is inside."""
+    lines = Sightlines(np.concatenate([cube((0, 0, 0), 10), cube((5, 5, 5), 10)[:, ::-1]]), np.repeat([0, 1], 12))
+    points = [(1, 1, 1), (7, 7, 7), (12, 12, 12), (4, 11, 11)]
+    assert lines.outside_solids(np.array(points, float)).tolist() == [False, False, False, True]
 
 
 def test_two_halves_of_different_objects_are_not_a_solid():

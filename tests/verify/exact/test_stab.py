@@ -1,7 +1,8 @@
 """Exact axial stabbing: the published vectors, an LP referee, and laws."""
 
+from dataclasses import replace
 from fractions import Fraction
-from itertools import product
+from itertools import combinations, product
 
 import highspy
 import numpy as np
@@ -181,7 +182,10 @@ def test_checker_rejects_forged_certificates():
     signs = (1, 1, 1)
     good = stab(blocked, signs).certificate
     assert check_certificate(blocked, signs, good)
-    assert not check_certificate(blocked, (1, -1, -1), good) or stab(blocked, (1, -1, -1)).verdict is Verdict.HIDDEN
+    (i, j, k, m), *rest = good.cuts[0]
+    assert not check_certificate(
+        blocked, signs, replace(good, cuts=(((i, j, k, 1 - min(m, 1)), *rest), *good.cuts[1:]))
+    )
     negative = Certificate(good.cuts, tuple(-weight for weight in good.lambdas))
     open_cycle = Certificate((good.cuts[0][:1],), (1,))
     mixed = Certificate((((0, 1, 0, 1), (1, 0, 1, 0)),), (1,))
@@ -190,6 +194,56 @@ def test_checker_rejects_forged_certificates():
     for i, j in ((0, 1), (1, 2), (0, 2)):
         for k, m in product(range(2), repeat=2):
             assert not check_certificate(boxes, signs, Certificate((((i, j, k, k), (j, i, m, m)),), (1,)))
+
+
+def test_a_certificate_of_one_list_proves_nothing_of_another():
+    """Of lists that a line passes, and of octants in which one does: each proof of a neighbour is refused there."""
+    rng, refused, octants = np.random.default_rng(3), 0, 0
+    for _ in range(150):
+        n = int(rng.integers(2, 6))
+        low = np.arange(n)[:, None] * rng.integers(0, 2, 3) + rng.integers(0, 4, (n, 3))
+        boxes = np.stack([low, low + rng.integers(0, 4, (n, 3))], axis=1)
+        proofs = [stab(boxes, signs).certificate for signs in OCTANTS]
+        others = [boxes] + [boxes + rng.integers(0, 2, boxes.shape) * [[[-1], [1]]] for _ in range(4)]
+        for other in others:
+            seen = [signs for signs in OCTANTS if stab(other, signs).verdict is Verdict.VISIBLE]
+            for signs, proof in product(seen, filter(None, proofs)):
+                assert not check_certificate(other, signs, proof), (other.tolist(), signs, proof)
+                refused += 1
+                octants += other is boxes
+    assert refused > 1000 and octants > 100
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1), (1, -1, 1), (-1, -1, -1)])
+def test_no_certificate_hides_what_a_line_passes(signs):
+    """Every cycle of one or two arcs, many of three and many pairs of cycles, whether or not they close."""
+    rng = np.random.default_rng(5)
+    arcs = list(product(range(3), range(3), range(2), range(2)))
+    cycles = [*((arc,) for arc in arcs), *product(arcs, arcs)]
+    cycles += [tuple(arcs[n] for n in rng.integers(0, len(arcs), 3)) for _ in range(2000)]
+    orders = [(0, 1), (0, 2), (1, 2), (0, 1, 2), (0, 2, 1)]
+    closed = [
+        tuple((order[n], order[(n + 1) % len(order)], k, k) for n, k in enumerate(held))
+        for order in orders
+        for held in product(range(2), repeat=len(order))
+    ]
+    for shift in product((-40, 40), repeat=3):
+        # A cell and a portal beyond it; where they are decides what a cycle that is open says.
+        boxes = boxes_of((0, 0, 0), (2, 2, 2), (5, 4, 3), (5, 6, 6)) + shift
+        boxes = np.sort(boxes * np.array(signs), axis=1)
+        assert stab(boxes, signs).verdict is Verdict.VISIBLE
+        for cycle, weight in product(cycles, (1, -1)):
+            assert not check_certificate(boxes, signs, Certificate((cycle,), (weight,)))
+            assert not check_certificate(boxes, signs, Certificate((cycle,), (weight,), graze=True))
+        for pair, weights in product(combinations(closed, 2), product((-1, 0, 1, 2), repeat=2)):
+            assert not check_certificate(boxes, signs, Certificate(pair, weights, graze=not any(weights)))
+
+
+@given(portal_sequences())
+def test_a_certificate_does_not_confuse_grazing_with_missing(sequence):
+    boxes, signs = sequence
+    if proof := stab(boxes, signs).certificate:
+        assert not check_certificate(boxes, signs, replace(proof, graze=not proof.graze))
 
 
 @pytest.mark.parametrize(

@@ -95,6 +95,14 @@ FAN = np.array([[[0, 0, 0], [4, 0, 1], [4, 4, 0]], [[0, 0, 0], [0, 4, 1], [4, 4,
 OUTLINE = [[0, 0, 0], [4, 0, 1], [4, 4, 0], [0, 4, 1]]
 
 
+def test_a_disc_is_of_triangles_that_its_object_has():
+    surfaces = OpaqueSurfaces(np.concatenate([FAN, FAN + 9]), np.repeat([3, 7], 2))
+    assert surfaces.disc(3, [1, 0]).tolist() == FAN[::-1].tolist()
+    assert surfaces.disc(7, [1]).tolist() == (FAN[1:] + 9).tolist()
+    for object_id, places in ((3, []), (3, [0, 0]), (3, [0, 2]), (3, [-1, 0]), (4, [0]), (8, [0]), (2, [0])):
+        assert surfaces.disc(object_id, places) is None
+
+
 def test_a_disc_is_bounded_by_its_outline():
     assert bounds_disc(FAN, OUTLINE) and bounds_disc(FAN, OUTLINE[::-1]) and bounds_disc(FAN[::-1, ::-1], OUTLINE)
     # A point along an edge may be left out, one beside it may not.

@@ -28,6 +28,7 @@ from viewcell.workbench.verify import make_judge
 RAYS = 30_000
 DESK, PANE = 17, 18
 KINDS = ("cell", "object")
+SHELVED, NARROW = [[0, 0, 5], [1000, 1000, 995]], [[-300, 500, 500], [-293, 507, 507]]
 
 
 @pytest.fixture(scope="module")
@@ -203,6 +204,28 @@ def test_a_refused_pair_is_proposed_a_few_times_only(house):
     planted = without(house.objects, 0, 0)
     proposed = sum(len(found.rows) for found, _ in search(house, planted).batches(4 * RAYS))
     assert proposed == ATTEMPTS
+
+
+@pytest.mark.parametrize("strategy", ["uniform", "aim", "mutate"])
+@pytest.mark.parametrize(("far", "box"), [(0, SHELVED), (2**24 - 1100, SHELVED), (2**24 - 1100, NARROW)])
+def test_candidates_start_strictly_inside_their_cell_and_outside_solids(far, box, strategy):
+    """In a view cell that is a quarter full of shelves, and in one of a few grid steps at the end of the grid."""
+    unit = np.array(list(product((0, 1), repeat=3)))
+    shelves = [unit * [1000, 1000, 10] + [0, 0, 40 * n] for n in range(25)]
+    triangles = np.concatenate([shelf[small_house.FACES] for shelf in shelves]) + far
+    opaque, none = (triangles, np.repeat(np.arange(25), 12)), (np.zeros((0, 3, 3), int), np.zeros(0, int))
+    lines, total = Sightlines(*opaque), 0
+    # What is claimed and seen is what rays are varied about.
+    claimed = np.arange(25)[None] % 2 == 0
+    search = Falsifier(
+        boxes=np.array([box]) + far, spots=[np.zeros((0, 3), np.float32)], claimed=claimed, opaque=opaque,
+        glass=none, lines=lines, shares={strategy: 1},
+    )  # fmt: skip
+    for found, _ in search.batches(RAYS):
+        assert ((found.origins - far > box[0]) & (found.origins - far < box[1])).all()
+        assert lines.outside_solids(found.origins).all()
+        total += len(found.rows)
+    assert total > 20
 
 
 def test_uniform_rays_are_counted(house):
@@ -435,14 +458,35 @@ def test_hints_of_a_certified_bake(tmp_path):
     assert set(certificate_hints(made, np.array([0])).rows) == {0}
 
 
+def in_the_middle(house):
+    """The house seen from the middle of each view cell alone, where nothing is near."""
+    boxes = house.boxes[house.sources].astype(float)
+    return bench.Setting(house.made, house.judge, house.sources, list(boxes.mean(axis=1)[:, None].astype(np.float32)))
+
+
 def test_solid_angles_of_a_closed_room_fill_the_sphere(house):
-    """The graded solid angles of all that is seen from a view cell sum to 4 pi; near surfaces spread them."""
-    setting = bench.Setting(house.made, house.judge, house.sources, house.spots)
-    estimate, count = bench.SolidAngles(setting), 20_000
-    objects = np.arange(PANE)
+    """The graded solid angles of all that is seen from a point sum to 4 pi, as closely as they say."""
+    estimate, count, objects = bench.SolidAngles(in_the_middle(house)), 30_000, np.arange(PANE)
     for row in range(len(house.sources)):
-        sums, _ = estimate(np.full(len(objects), row), objects, count, np.random.default_rng(0))
-        assert sums.sum() / count == pytest.approx(4 * math.pi, rel=0.15)
+        sums, squares = estimate(np.full(len(objects), row), objects, count, np.random.default_rng(0))
+        error = math.sqrt((squares / count - (sums / count) ** 2).sum() / count)
+        assert error < 0.02 * 4 * math.pi
+        assert abs(sums.sum() / count - 4 * math.pi) < 4 * error
+
+
+def test_the_solid_angle_of_a_desk_is_that_of_its_outline(house):
+    """Half the solid angles of its sides, whichever way they face: a line meets a box that it meets twice."""
+    row, count = list(house.sources).index(2), 200_000
+    sums, squares = bench.SolidAngles(in_the_middle(house))(
+        np.array([row]), np.array([DESK]), count, np.random.default_rng(1)
+    )
+    error = math.sqrt((squares[0] / count - (sums[0] / count) ** 2) / count)
+    triangles, owners = house.made.scene.triangles()
+    a, b, c = (triangles[owners == DESK].astype(float) - house.boxes[2].mean(axis=0)).transpose(1, 0, 2)
+    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+    bottom = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
+    exact = np.abs(2 * np.arctan2((a * np.cross(b, c)).sum(axis=1), bottom)).sum() / 2
+    assert error < 0.01 * exact and abs(sums[0] / count - exact) < 4 * error
 
 
 def test_expected_uniform_rays():

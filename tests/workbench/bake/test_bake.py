@@ -1,8 +1,14 @@
 """Whole bakes: two-sided, symmetric, repeatable, resumable, and conservative against brute force."""
 
+import shutil
+from dataclasses import fields, replace
+from pathlib import Path
+
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 import viewcell
+from builders import corridors, random_buildings
 from builders.places import SHARED
 from builders.random_buildings import box_triangles as box
 from builders.random_buildings import scene_of, tetrahedron
@@ -11,7 +17,8 @@ from viewcell.data.errors import InputError
 from viewcell.data.scene import Role
 from viewcell.verify.exact.sightline import Sight, Sightlines
 from viewcell.verify.rays.witness import visible_rows
-from viewcell.workbench.bake import blocks
+from viewcell.workbench.bake import blocks, manifest
+from viewcell.workbench.bake import run as baking
 from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.baked import load
 
@@ -27,13 +34,6 @@ def office():
 @pytest.fixture(scope="module")
 def office_bake(office, tmp_path_factory):
     return viewcell.bake(office, tmp_path_factory.mktemp("bake") / "office", threads=1)
-
-
-def w48():
-    folder = SHARED / "graphs" / "w48"
-    if not folder.is_dir():
-        pytest.skip("needs w48 of the shared graphs folder")
-    return folder
 
 
 def same_tables(one, other):
@@ -74,10 +74,15 @@ def test_office_is_two_sided(office_bake):
     assert 0 < len(office_bake.potential(cell)) < counts["objects"]
 
 
-def test_bare_graph_is_two_sided(tmp_path):
-    bake = viewcell.bake(w48(), tmp_path / "w48")
+@pytest.mark.parametrize(("name", "rows"), [("office", None), ("w48", round(38.42857 * 182))])
+def test_bare_graph_is_two_sided(name, rows, tmp_path):
+    """As many pairs as an exact search finds, or were published."""
+    folder = corridors.graph_folder(name, tmp_path)
+    bake = viewcell.bake(folder, tmp_path / "made")
     check_two_sided(bake, rays=50_000)
-    assert bake.cell_to_cell.num_rows == round(38.42857 * 182) and bake.cell_to_object.num_rows == 0
+    if name == "office":
+        rows = int(random_buildings.reached_matrix(bake.graph)[bake.graph.inhabitable].sum())
+    assert bake.cell_to_cell.num_rows == rows and bake.cell_to_object.num_rows == 0
 
 
 @pytest.mark.parametrize(("threads", "block"), [(1, 24), (2, 24), (2, 1), (1, 3), (2, 5)])
@@ -86,8 +91,10 @@ def test_repeats_threads_and_blocks_change_nothing(threads, block, office, offic
     assert same_tables(viewcell.bake(office, tmp_path / "again", threads=threads), office_bake)
 
 
-def test_bare_graph_repeats(tmp_path):
-    bakes = [viewcell.bake(w48(), tmp_path / f"w48 {threads}", threads=threads) for threads in (1, 2)]
+@pytest.mark.parametrize("name", ["office", "w48"])
+def test_bare_graph_repeats(name, tmp_path):
+    folder = corridors.graph_folder(name, tmp_path)
+    bakes = [viewcell.bake(folder, tmp_path / f"made {threads}", threads=threads) for threads in (1, 2)]
     assert same_tables(*bakes)
 
 
@@ -156,15 +163,124 @@ def test_a_spent_budget_is_made_up_for(office, office_bake, tmp_path):
 
 def test_a_finished_bake_is_kept_and_a_changed_one_is_not(office, office_bake, tmp_path):
     first = viewcell.bake(office, tmp_path / "office")
-    manifest = first.folder / "manifest.json"
-    stamp = manifest.stat().st_mtime_ns
+    path = first.folder / "manifest.json"
+    stamp = path.stat().st_mtime_ns
     viewcell.bake(office, tmp_path / "office")
-    assert manifest.stat().st_mtime_ns == stamp
+    assert path.stat().st_mtime_ns == stamp
     other = viewcell.bake(office, tmp_path / "office", settings=Settings(seed=5))
-    assert manifest.stat().st_mtime_ns != stamp and other.manifest["settings"]["seed"] == 5
+    assert path.stat().st_mtime_ns != stamp and other.manifest["settings"]["seed"] == 5
     assert pairs(load(tmp_path / "office").cell_to_cell, "reached_cell_id") == pairs(
         office_bake.cell_to_cell, "reached_cell_id"
     )
+
+
+def small_scene():
+    """Two solids, a room and a hole."""
+    boxes = [(box(low, high), "occluder") for low, high in (((0, 0, 0), (99, 2000, 2000)), ((999, 0, 0), (1999,) * 3))]
+    scene = scene_of(boxes, [((100, 0, 0), (999, 1999, 1999))])
+    return replace(scene, openings=np.array([[[0.0, 0.5, 0.5], [0.1, 1.0, 1.0]]]))
+
+
+def with_mesh(scene, **changes):
+    shape = scene.definitions[0]
+    return replace(
+        scene, definitions=[replace(shape, lods=(replace(shape.lods[0], **changes),)), *scene.definitions[1:]]
+    )
+
+
+def with_first(scene, of, **changes):
+    first, *rest = getattr(scene, of)
+    return replace(scene, **{of: [replace(first, **changes), *rest]})
+
+
+INGREDIENTS = {
+    "corners": lambda s: with_mesh(s, vertices=s.definitions[0].lods[0].vertices * 1.5),
+    "faces": lambda s: with_mesh(s, faces=s.definitions[0].lods[0].faces[::-1]),
+    "error": lambda s: with_mesh(s, error_m=0.25),
+    "name": lambda s: with_first(s, "objects", name="else"),
+    "kind": lambda s: with_first(s, "objects", kind="else"),
+    "shape": lambda s: with_first(s, "objects", definition_id=1),
+    "role": lambda s: with_first(s, "objects", role=Role.DETAIL),
+    "place": lambda s: with_first(s, "objects", transform=s.objects[0].transform + np.eye(4, k=3)),
+    "order": lambda s: replace(s, objects=s.objects[::-1]),
+    "room's name": lambda s: with_first(s, "spaces", name="else"),
+    "room": lambda s: with_first(s, "spaces", vertices=s.spaces[0].vertices * 0.5),
+    "room's faces": lambda s: with_first(s, "spaces", faces=s.spaces[0].faces[::-1]),
+    "openings": lambda s: replace(s, openings=s.openings + 0.125),
+    "grid": lambda s: replace(s, grid_m=s.grid_m / 2),
+    "origin": lambda s: replace(s, origin=np.array([16.0, 0, 0])),
+}
+
+
+@pytest.fixture(scope="module")
+def small_bake(tmp_path_factory):
+    return viewcell.bake(small_scene(), tmp_path_factory.mktemp("small") / "small", threads=1)
+
+
+@pytest.fixture
+def asked_again(small_bake, tmp_path, monkeypatch):
+    """Whether a bake to where a finished one is begins anew."""
+    out = Path(shutil.copytree(small_bake.folder, tmp_path / "small"))
+
+    class BegunError(Exception):
+        pass
+
+    def begin(*_):
+        raise BegunError
+
+    def ask(scene, **changes):
+        monkeypatch.setattr(baking, "PreparedModel", begin)
+        try:
+            viewcell.bake(scene, out, settings=Settings(**changes), threads=1)
+        except BegunError:
+            return True
+        return False
+
+    return ask
+
+
+@pytest.mark.parametrize("part", INGREDIENTS)
+def test_a_bake_of_another_model_is_not_kept(part, asked_again):
+    assert not asked_again(small_scene()) and asked_again(INGREDIENTS[part](small_scene()))
+
+
+OTHER = {
+    "threshold_m2": 0.5, "seed": 1, "doors": "closed", "method": "both", "cells": "octree", "cell_size_m": 2.0,
+    "depth": 1, "refine_triangles": 7, "refine_gap": 0.5, "certify": True, "clusters": 6, "objective": "centre",
+    "resolution": 64, "split": True, "lods": True, "pixels": 2.0, "image": "64x64", "fov_deg": 70.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(Settings) if field.name != "seal"])
+def test_a_bake_of_other_settings_is_not_kept(name, asked_again):
+    """Any of them; a seal cannot be asked for yet."""
+    assert asked_again(small_scene(), **{name: OTHER[name]})
+
+
+def test_a_bake_of_another_version_is_not_kept(asked_again, monkeypatch):
+    monkeypatch.setattr(manifest, "__version__", "0.0.0-else")
+    assert asked_again(small_scene())
+
+
+@pytest.mark.parametrize("name", ["cells", "portals"])
+def test_a_bake_of_a_graph_that_was_changed_is_not_kept(name, tmp_path):
+    """Under the same name."""
+    folder = corridors.write_graph(corridors.corridor(4), tmp_path / "graph")
+    first = viewcell.bake(folder, tmp_path / "b", threads=1)
+    assert viewcell.bake(folder, tmp_path / "b", threads=1).manifest == first.manifest
+    table = pq.read_table(folder / f"{name}.parquet")
+    pq.write_table(table, folder / f"{name}.parquet", compression="none")
+    again = viewcell.bake(folder, tmp_path / "b", threads=1)
+    assert again.manifest["fingerprint"] != first.manifest["fingerprint"]
+
+
+def test_a_bake_of_view_cells_that_were_changed_is_not_kept(tmp_path):
+    cells, scene = tmp_path / "cells.csv", small_scene()
+    settings = Settings(method="occluders", cells=str(cells))
+    for low in (0.25, 0.5):
+        cells.write_text(f"min_x,min_y,min_z,max_x,max_y,max_z\n{low},0.5,0.5,0.75,1,1\n")
+        made = viewcell.bake(scene, tmp_path / "b", settings=settings, threads=1)
+        assert made.graph.cells[0, 0, 0] == low * METRE
 
 
 @pytest.mark.parametrize(

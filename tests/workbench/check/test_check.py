@@ -23,9 +23,11 @@ from viewcell.verify.check_result import WrongPair
 from viewcell.verify.exact.sightline import Sightlines
 from viewcell.verify.rays.clearance import clearances
 from viewcell.verify.rays.confidence import Confidence
+from viewcell.verify.rays.embree import Candidates
 from viewcell.verify.rays.free_space import FreeSpace
 from viewcell.verify.rays.second_look import SecondLook
 from viewcell.verify.rays.targets import Targets
+from viewcell.workbench.bake.run import bake
 from viewcell.workbench.check.run import _Hunt, assert_conservative, check
 from viewcell.workbench.cli import main
 
@@ -111,6 +113,40 @@ def test_cells_are_snapped_into_the_given_boxes(house):
     assert inner[:, :, 0].tolist() == [[1, 8], [10, 99]] and outer[:, :, 0].tolist() == [[0, 9], [9, 100]]
 
 
+@pytest.mark.parametrize("written", [False, True])
+def test_no_eye_is_outside_the_given_boxes(written, house, claims, tmp_path):
+    """Cells that are off the grid become smaller, not larger: what is judged is in the cell that was asked about."""
+    table = boxes_of(house)
+    moved = {f"{side}_{a}": by * GRID for side, by in (("min", 0.3), ("max", -0.4)) for a in "xyz"}
+    for name, by in moved.items():
+        place = table.column_names.index(name)
+        table = table.set_column(place, name, pa.array(table[name].cast(pa.float64()).to_numpy() + by))
+    if written:
+        pq.write_table(table, tmp_path / "cells.parquet")
+    found = check(house.scene, claims, tmp_path / "cells.parquet" if written else table, rays=RAYS)
+    for side, name in enumerate(("min", "max")):
+        given = np.column_stack([table[f"{name}_{a}"].to_numpy() for a in "xyz"]) / GRID
+        assert ((found.boxes[:, side] - given) * (1, -1)[side] > 0).all()
+    assert found.ok
+
+
+def test_view_cells_of_a_bake_lie_where_the_bake_does(house, tmp_path):
+    """A bake's own origin counts, and the model may have another."""
+    here, there = np.array([1000.0, -3000.0, 20.0]), np.array([1016.0, -3016.0, 24.0])
+    made = bake(dataclasses.replace(house.scene, origin=here), tmp_path / "b", threads=1)
+    objects = [
+        dataclasses.replace(placed, transform=placed.transform - np.pad((there - here)[:, None], ((0, 1), (3, 0))))
+        for placed in house.scene.objects
+    ]
+    for scene, origin in (
+        (dataclasses.replace(house.scene, origin=here), here),
+        (dataclasses.replace(house.scene, objects=objects, origin=there), there),
+    ):
+        found = assert_conservative(made, scene, rays=RAYS)
+        assert (found.boxes == made.graph.cells - (origin - here) / GRID).all()
+        assert found.by_cell("object")[1].sum() > 0
+
+
 def test_everything_claimed_is_never_wrong(house):
     everything = np.ones((house.graph.cell_count, len(house.scene.objects)), bool)
     result = check(house.scene, everything, boxes_of(house), rays=RAYS)
@@ -174,6 +210,17 @@ def test_a_second_look_sees_what_is_visible_and_nothing_else(house):
     assert glass and seen.reshape(truth.shape)[:, len(house.scene.objects) - 1].any()
 
 
+def test_a_second_look_never_looks_from_within_a_solid():
+    """A solid hides what is in it, from a view cell that reaches into the solid and from one that is all inside."""
+    solid, hidden = ((small_house.UNIT_BOX * size + low)[small_house.FACES] for size, low in ((1000, 0), (99, 40)))
+    triangles, owners = np.concatenate([solid, hidden]).astype(np.int64), np.repeat([0, 1], 12)
+    boxes, lines = np.array([[[-30, 0, 0], [30, 90, 90]], [[300] * 3, [400] * 3]]), Sightlines(triangles, owners)
+    free = FreeSpace(boxes, [np.zeros((0, 3), np.float32)] * 2, lines)
+    look = SecondLook(free, Targets(triangles, owners, 2, np.zeros((0, 2, 3), int)), (triangles, owners))
+    pairs = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
+    assert look.see(*pairs.T, 3000, 0)[0].tolist() == [True, False, False, False]
+
+
 def test_confidence_holds_as_often_as_it_says():
     hole, random = 0.05, np.random.default_rng(0)
     statement = Confidence(np.array([400]))
@@ -184,6 +231,25 @@ def test_confidence_holds_as_often_as_it_says():
     many = Confidence(np.full(100, 400))
     assert many.chance_missed(many.holes_sr[0]) == pytest.approx(0.05 / 100)
     assert Confidence(np.array([400, 0])).line() == "none: a view cell got no random ray"
+    # Of several cells the one with the fewest rays counts; without rays nothing is ruled out.
+    uneven = Confidence(np.array([100, 10_000, 3000]))
+    assert uneven.chance_missed(hole) == pytest.approx((1 - hole / (4 * np.pi)) ** 100)
+    assert uneven.holes_sr.argmax() == 0 and (np.diff(uneven.holes_sr[[1, 2, 0]]) > 0).all()
+    assert (
+        "at least 100 random rays per cell" in uneven.line() and f"{uneven.holes_sr[0]:.2g} sr of what" in uneven.line()
+    )
+    alone = 4 * np.pi * (1 - 0.01 ** (1 / 100))
+    assert f"a hole of {alone:.2g} sr in a given cell" in uneven.line()
+    assert Confidence(np.array([0, 5])).holes_sr[0] == pytest.approx(4 * np.pi)
+    assert Confidence(np.array([0, 5])).chance_missed(9.0) == 1.0 == Confidence(np.zeros(0, int)).chance_missed(9.0)
+
+
+def test_confidence_in_many_cells_at_once_holds_as_often_as_it_says():
+    """Holes of just the size that is ruled out, one in every cell: that any is missed happens in 5 of 100 checks."""
+    random, rays = np.random.default_rng(1), np.array([50, 200, 800, 200])
+    sizes = Confidence(rays).holes_sr / (4 * np.pi)
+    missed = random.random((20_000, 4)) < (1 - sizes) ** rays
+    assert abs(missed.any(axis=1).mean() - 0.05) < 0.006
 
 
 def write_inputs(folder, house, claims):
@@ -248,6 +314,39 @@ def test_words_are_no_flags(house, claims):
     words = pa.array(["yes" if flag else "no" for flag in table["inhabitable"].to_pylist()])
     with pytest.raises(InputError, match="cells: expected true or false as inhabitable, found 'yes'"):
         check(house.scene, claims[0], table.set_column(7, "inhabitable", words), rays=RAYS)
+
+
+def candidates(*rows):
+    """Suspects (row of the view cells, kind, target, origin, direction, reach)."""
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    return Candidates(*columns[:3], *(column.astype(float) for column in columns[3:]))
+
+
+def test_only_what_the_judge_calls_visible_accuses(house):
+    """A suspect that grazes, one that is blocked, one that starts in a wall, and the same pair twice."""
+    view = view_cells(boxes_of(house), house.scene, "cells", inwards=True)
+    objects, cells = house.potential_objects.copy(), house.potential_cells.copy()
+    cells[0, 2], objects[2, 17] = False, False
+    hunt = _Hunt(house.scene, view, Claims(objects, cells), RAYS, 0)
+    along, diagonal = [1.0, 0, 0], [0.6, 0.8, 0]
+    room = int(np.flatnonzero(hunt.result.sources == 2)[0])
+    hunt.judge_suspects(
+        candidates(
+            # Along the edge of doorway 1, into the wall beside it, and from within the outer wall.
+            (0, 0, 2, [2500.0, 960, 640], along, 4000.0),
+            (0, 0, 2, [2500.0, 961, 640], along, 4000.0),
+            (0, 0, 2, [-10.0, 640, 640], along, 4000.0),
+            # Along the top of the desk, past it, and from within it.
+            (room, 1, 17, [2900.0, 2200, 512], along, 940.0),
+            (room, 1, 17, [2900.0, 2200, 600], along, 940.0),
+            (room, 1, 17, [4000.0, 2200, 200], along, 100.0),
+        )
+    )
+    assert hunt.result.wrong == [] and (hunt.result.grazes, hunt.result.blocked) == (3, 3)
+    clear = (0, 0, 2, [2500.0, 640, 640], along, 4000.0)
+    desk = (room, 1, 17, [2900.0, 2200, 200], along, 940.0)
+    hunt.judge_suspects(candidates(clear, clear, desk, (0, 0, 2, [2400.0, 600, 640], diagonal, 100.0)))
+    assert [(w.kind, w.cell, w.target) for w in hunt.result.wrong] == [("cell", 0, 2), ("object", 2, 17)]
 
 
 def test_a_narrow_sightline_is_told(house, claims):

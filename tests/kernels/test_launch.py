@@ -1,0 +1,90 @@
+"""What all launchers share: coordinates beyond the grid are refused, and every item is done once."""
+
+import numpy as np
+import pytest
+import warp as wp
+from builders import random_solids
+from builders.blocker_scenes import blockers_of
+from viewcell.data.errors import InputError
+from viewcell.data.solids import closed_elements
+from viewcell.kernels.backface import build_cones, launch_backface
+from viewcell.kernels.blockers import blocker_tree
+from viewcell.kernels.coverage import launch_coverage
+from viewcell.kernels.launch import CPU, Device, check_coordinates, run_sliced
+from viewcell.kernels.line_tree import launch_line_trees
+from viewcell.kernels.occludee import launch_occludees
+from viewcell.kernels.shaft import launch_shaft
+from viewcell.kernels.sightline import device_triangles, launch_confirm
+from viewcell.kernels.stab_batch import launch_stab
+from viewcell.kernels.target import launch_target_search
+
+LIMIT = 2**24
+SCENE = random_solids.scene_of_meshes([random_solids.box([0, 0, 0], [1, 2, 3])])
+CONES = build_cones(closed_elements(SCENE), SCENE.triangle_counts)
+ROW, PAIR = np.array([[0, 1, 0]]), np.array([[0, 0]])
+
+
+def blockers():
+    return blocker_tree(blockers_of(np.array([[[5, -9, -9], [5, 9, 9]]])))
+
+
+def maps():
+    corners = np.array([[900.0, -9, -9], [900, 9, -9], [900, 0, 9]])
+    return launch_coverage(np.zeros((1, 3)), corners, [0, 3], [0], resolution=2)
+
+
+# What each launcher does with two boxes, shape (2, 2, 3).
+LAUNCHERS = {
+    "blockers": lambda boxes: blocker_tree(blockers_of(np.where([0, 0, 1], boxes[:, :1], boxes))),
+    "target": lambda boxes: launch_target_search(blockers(), boxes, ROW),
+    "line trees": lambda boxes: launch_line_trees(blockers(), boxes, ROW, np.array([3])),
+    "shaft": lambda boxes: launch_shaft(random_solids.shields_of(SCENE)[0], boxes, ROW[:, :2], smallest=(64, 64)),
+    "triangles": lambda boxes: device_triangles(
+        boxes.reshape(1, 4, 3)[:, [0, 1, 3]].astype(np.int32), np.zeros(1, int)
+    ),
+    "confirm": lambda boxes: launch_confirm(
+        device_triangles(*SCENE.triangles()), boxes[:, 0].astype(float), boxes[:, 1].astype(float), np.array([-1, -1])
+    ),
+    "occludees": lambda boxes: launch_occludees(maps(), boxes, PAIR),
+    "backface": lambda boxes: launch_backface(CONES, boxes, PAIR),
+    "stab": lambda boxes: launch_stab(boxes[None], np.ones((1, 3), int)),
+}
+
+
+@pytest.mark.parametrize("launcher", LAUNCHERS)
+@pytest.mark.parametrize("side", [-1, 1])
+def test_coordinates_beyond_the_grid_are_refused(launcher, side):
+    boxes = np.array([[[-9, -8, -7], [-1, -2, -3]], [[1, 2, 3], [9, 8, 7]]])
+    far = boxes.copy()
+    place = (0, 0, 0) if side < 0 else (1, 1, 0)
+    far[place] = side * LIMIT
+    LAUNCHERS[launcher](far)
+    far[place] += side
+    with pytest.raises(InputError, match=r"expected .*16777216 (grid )?steps.*found \S*16777217"):
+        LAUNCHERS[launcher](far)
+
+
+@pytest.mark.parametrize("value", [LIMIT + 1, -LIMIT - 1, np.nan, np.inf, LIMIT + 0.001])
+def test_the_limit_is_exact(value):
+    check_coordinates(np.array([LIMIT, -LIMIT, 0.0]))
+    check_coordinates(np.zeros(0))
+    with pytest.raises(InputError, match="coordinates: expected at most 16777216 grid steps"):
+        check_coordinates(np.array([0.0, value]))
+    if value == np.floor(value):
+        with pytest.raises(InputError, match="coordinates"):
+            CPU.corners(np.array([[0, 0, int(value)]]) if np.isfinite(value) else np.array([[0, 0, value]]))
+
+
+class AsGpu(Device):
+    """The CPU, treated as a GPU."""
+
+    is_cpu = False
+
+
+@pytest.mark.parametrize("device", [CPU, Device("cpu", 3), AsGpu()], ids=["cpu", "threads", "gpu"])
+@pytest.mark.parametrize("count", [1, 3, 4, 5, 11, 12])
+def test_every_row_is_launched_once(count, device):
+    rows = []
+    launch = lambda first, last: rows.extend(range(first, last))  # noqa: E731
+    run_sliced(launch, count, wp.get_module("viewcell.kernels.launch"), device, chunk=4, gpu_chunk=4)
+    assert sorted(rows) == list(range(count))
