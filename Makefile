@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: install run test test-slow lint clean
+.PHONY: install run test test-slow mutants lint clean
 
 install: .venv/installed
 
@@ -24,6 +24,10 @@ test: install
 
 test-slow: install
 	$(BIN)/python -m pytest -m slow
+
+# ONLY=TEXT tries the faults whose name or file holds the text.
+mutants: install
+	$(BIN)/python tests/mutants/run.py --only "$(ONLY)"
 
 lint: install
 	$(BIN)/ruff check .
