@@ -20,10 +20,10 @@ run: install
 	$(BIN)/viewcell report out/office
 
 test: install
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto
 
 test-slow: install
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest -n auto -m slow
 
 # ONLY=TEXT tries the faults whose name or file holds the text.
 mutants: install
