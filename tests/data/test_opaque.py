@@ -57,8 +57,8 @@ def test_axial_outlines_are_kept_exactly_or_what_is_lost_is_told(seed, count):
     doubled, sizes = raster(us, vs)
     truth = covered(2 * triangles, doubled)
     inside = inside_rectangles(rectangles, doubled)
-    # Diagonals of two rectangles that lie on one line are oblique outlines if they do not cancel: something is lost then,
-    # and said to be.
+    # Diagonals of two rectangles that lie on one line are oblique outlines if they do not cancel: something is lost
+    # then, and said to be.
     assert (inside <= truth).all()
     if lost == 0:
         np.testing.assert_array_equal(inside, truth.astype(int))
