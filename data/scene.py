@@ -41,11 +41,13 @@ class Mesh:
         vertices: [m], shape (n, 3), float64, in the definition's frame.
         faces: vertex indices, shape (m, 3), int32.
         error_m: bound on the surface deviation from the finest level; 0 for the finest.
+        colours: base colour of each face, red, green, blue and opacity, shape (m, 4), uint8; None where none is known.
     """
 
     vertices: np.ndarray
     faces: np.ndarray
     error_m: float = 0.0
+    colours: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class Instance:
 
     Attributes:
         transform: definition frame to scene frame (metres from `Scene.origin`, Z up), shape (4, 4), float64.
+        guid: the file's own lasting name, such as an IFC GlobalId; empty where the format has none.
+        why: what it was taken for glass or a door by, in words; empty for the rest, and not kept in folders.
     """
 
     name: str
@@ -69,6 +73,8 @@ class Instance:
     definition_id: int
     transform: np.ndarray
     role: Role
+    guid: str = ""
+    why: str = ""
 
     @property
     def opaque(self) -> bool:

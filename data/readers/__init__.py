@@ -6,7 +6,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..scene import GRID_M, Scene, source_path
 from .assemble import Model
-from .roles import check_doors
+from .roles import RoleRules
 
 IFC_SUFFIXES = (".ifc",)
 MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -19,6 +19,9 @@ def read(
     up: str | None = None,
     unit: str | float | None = None,
     doors: str = "open",
+    glass: str = "",
+    doors_by: str = "",
+    leave_out: str = "",
     grid_m: float = GRID_M,
 ) -> Scene:
     """The model in a file or scene folder, as a scene ready to bake.
@@ -28,14 +31,17 @@ def read(
         up: axis that points up in a mesh file, "y" or "z"; by default y for glTF, which says so, and z for the others.
         unit: unit of a mesh file's numbers: a name such as "millimetre", or metres as a number; by default the metre.
         doors: "open" (sight passes every door) or "closed" (doors occlude; glazing never does).
+        glass: regular expression in place of the words for glass and windows in names; see `RoleRules`.
+        doors_by: in place of the words for doors.
+        leave_out: parts whose name, GUID or kind it finds are not read.
         grid_m: grid step [m].
 
     Raises:
         InputError: the file is missing, of no known type, unreadable, empty, or too large for the grid; or `up`,
-            `unit`, `doors` or `grid_m` do not fit it.
+            `unit`, `grid_m` or what tells roles do not fit it.
     """
     path = source_path(path)
-    check_doors(doors)
+    roles = RoleRules(doors, glass, doors_by, leave_out)
     if up not in UP_CHOICES:
         raise InputError(f"up: expected y or z, found {up!r}")
     if not 0.0 < grid_m < float("inf"):
@@ -51,10 +57,10 @@ def read(
             raise InputError(f"{path}: expected no up or unit for IFC, which states its own, found {up or unit}")
         from .ifc import read_ifc
 
-        return read_ifc(path, model, doors)
+        return read_ifc(path, model, roles)
     from .mesh import read_mesh
 
-    return read_mesh(path, model, up=up, unit=unit, doors=doors)
+    return read_mesh(path, model, up=up, unit=unit, roles=roles)
 
 
 def _read_folder(path: Path, grid_m: float) -> Scene:

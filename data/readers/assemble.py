@@ -21,6 +21,8 @@ class Part:
         vertices: [m], in the shape's own frame, shape (n, 3), float64.
         faces: shape (m, 3), int.
         transform: shape's frame to the model's, metres, Z up, shape (4, 4), float64.
+        guid, why: as in `Instance`.
+        colours: as in `Mesh`.
     """
 
     name: str
@@ -30,6 +32,9 @@ class Part:
     vertices: np.ndarray
     faces: np.ndarray
     transform: np.ndarray
+    guid: str = ""
+    why: str = ""
+    colours: np.ndarray | None = None
 
     def placed(self) -> np.ndarray:
         """Vertices in the model's frame [m]."""
@@ -124,18 +129,19 @@ def _share(parts: list[Part], origin: np.ndarray, model: Model) -> tuple[list[De
             continue
         dropped += flat
         if uses[part.shape] == 1:
-            mesh, to_scene = float32_mesh(part.placed() - origin, part.faces), np.eye(4)
+            mesh, to_scene = float32_mesh(part.placed() - origin, part.faces, colours=part.colours), np.eye(4)
             definitions.append(Definition(part.name, (mesh,)))
             definition_id = len(definitions) - 1
         else:
             if part.shape not in known:
                 centre = np.round((part.vertices.min(axis=0) + part.vertices.max(axis=0)) / 2)
                 known[part.shape] = len(definitions), centre
-                definitions.append(Definition(part.name, (float32_mesh(part.vertices - centre, part.faces),)))
+                mesh = float32_mesh(part.vertices - centre, part.faces, colours=part.colours)
+                definitions.append(Definition(part.name, (mesh,)))
             definition_id, centre = known[part.shape]
             to_scene = part.transform.copy()
             to_scene[:3, 3] += part.transform[:3, :3] @ centre - origin
-        objects.append(Instance(part.name, part.kind, definition_id, to_scene, part.role))
+        objects.append(Instance(part.name, part.kind, definition_id, to_scene, part.role, part.guid, part.why))
     if dropped:
         model.skip(f"{dropped} triangles", "no area on the grid")
     return definitions, objects
@@ -147,10 +153,12 @@ def _flat_count(part: Part, origin: np.ndarray, model: Model) -> int:
     return int(degenerate(snapped[part.faces]).sum())
 
 
-def float32_mesh(vertices: np.ndarray, faces: np.ndarray, error_m: float = 0.0) -> Mesh:
+def float32_mesh(
+    vertices: np.ndarray, faces: np.ndarray, error_m: float = 0.0, colours: np.ndarray | None = None
+) -> Mesh:
     """A mesh of welded vertices that float32 holds exactly, so that writing and reading it moves nothing."""
     rounded, index = np.unique(np.asarray(vertices).astype(np.float32), axis=0, return_inverse=True)
-    return Mesh(rounded.astype(np.float64), index.reshape(-1)[np.asarray(faces)].astype(np.int32), error_m)
+    return Mesh(rounded.astype(np.float64), index.reshape(-1)[np.asarray(faces)].astype(np.int32), error_m, colours)
 
 
 def _require_opaque(parts: list[Part] | list[Instance], model: Model) -> None:

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..scene import Role, Scene, Space
+from ..scene import Scene, Space
 from .assemble import Model, Part, assemble
-from .roles import ifc_role
+from .roles import RoleRules
 
 # The geometry of these is no surface that anything could stand before.
 NOT_OBJECTS = ("IfcOpeningElement", "IfcAnnotation", "IfcGrid", "IfcVirtualElement", "IfcSpatialElement")
@@ -24,13 +24,13 @@ STAR = re.compile(r"[(,]\*[,)]")
 TRANSPARENCY = 0.05
 
 
-def read_ifc(path: Path, model: Model, doors: str) -> Scene:
+def read_ifc(path: Path, model: Model, roles: RoleRules) -> Scene:
     """Scene of an IFC2x, IFC2x3, IFC4 or IFC4x3 file.
 
     Args:
         path: the file; it is never written to.
         model: source, sha256 and grid step; filled in here.
-        doors: "open" or "closed".
+        roles: what is glass, a door, or left out.
 
     Raises:
         InputError: the file is no IFC file, or holds nothing opaque that can be read.
@@ -41,7 +41,7 @@ def read_ifc(path: Path, model: Model, doors: str) -> Scene:
     shapes = {shape.guid: shape for shape in _shapes(ifc, exclude=("IfcOpeningElement", "IfcAnnotation", "IfcGrid"))}
     products = {product.GlobalId: product for product in ifc.by_type("IfcProduct")}
     for guid in sorted(shapes):
-        _take(products[guid], shapes[guid], model, doors)
+        _take(products[guid], shapes[guid], model, roles)
     _note_failures(ifc, shapes, model)
     _find_openings(ifc, shapes, model)
     return assemble(model)
@@ -117,7 +117,7 @@ def _by_type(ifc: object, name: str) -> list:
         return []
 
 
-def _take(product: object, shape: object, model: Model, doors: str) -> None:
+def _take(product: object, shape: object, model: Model, roles: RoleRules) -> None:
     """Add one product to the model as a space or an object, or to neither."""
     vertices, faces = _buffers(shape)
     transform = np.array(shape.transformation.matrix, np.float64).reshape(4, 4).T
@@ -130,10 +130,22 @@ def _take(product: object, shape: object, model: Model, doors: str) -> None:
     if any(product.is_a(name) for name in NOT_OBJECTS + NOT_OBJECTS_2X3) and not product.is_a("IfcSite"):
         return
     name = product.Name or product.GlobalId
-    role = ifc_role(product.is_a, f"{name} {product.ObjectType or ''}", doors, _in_curtain_wall(product))
-    if _glazed(shape):
-        role = Role.TRANSPARENT
-    model.parts.append(Part(name, product.is_a(), role, shape.geometry.id, vertices, faces, transform))
+    kind = product.is_a()
+    if roles.leaves_out(name, product.GlobalId, kind):
+        model.skip(name, f"{kind}: left out as asked")
+        return
+    glazed = "glass: a transparent material" if _glazed(shape) else ""
+    taken = roles.of_product(
+        product.is_a,
+        f"{name} {product.ObjectType or ''}",
+        kind,
+        in_curtain_wall=_in_curtain_wall(product),
+        glazed=glazed,
+    )
+    key = shape.geometry.id
+    model.parts.append(
+        Part(name, kind, taken.role, key, vertices, faces, transform, guid=product.GlobalId, why=taken.why)
+    )
 
 
 def _buffers(shape: object) -> tuple[np.ndarray, np.ndarray]:

@@ -6,19 +6,17 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..scene import Role, Scene
+from ..scene import Scene
 from .assemble import Model, Part, assemble
 from .obj import read_obj
-from .roles import named_role
+from .roles import OPAQUE_ALPHA, RoleRules
 from .units import metres_per_unit
 
 Y_UP_TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 HOLE_FILLERS = ("IfcDoor", "IfcWindow", "IfcPlate")
-# 8 bits a channel: anything the author made less than fully opaque.
-OPAQUE_ALPHA = 254 / 255
 
 
-def read_mesh(path: Path, model: Model, *, up: str | None, unit: str | float | None, doors: str) -> Scene:
+def read_mesh(path: Path, model: Model, *, up: str | None, unit: str | float | None, roles: RoleRules) -> Scene:
     """Scene of a mesh file; each node, group or solid is one object, and its material and name give its role.
 
     Args:
@@ -26,7 +24,7 @@ def read_mesh(path: Path, model: Model, *, up: str | None, unit: str | float | N
         model: source, sha256 and grid step; filled in here.
         up: "y", "z", or None for the format's habit.
         unit: see `metres_per_unit`; None for metres.
-        doors: "open" or "closed".
+        roles: what is glass, a door, or left out.
 
     Raises:
         InputError: the file cannot be read, or holds nothing opaque.
@@ -39,7 +37,7 @@ def read_mesh(path: Path, model: Model, *, up: str | None, unit: str | float | N
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what the loaders complain of shows in what they return
             take = _take_obj if path.suffix.lower() == ".obj" else _take_scene
-            take(path, model, to_model, doors)
+            take(path, model, to_model, roles)
     except (InputError, MemoryError):
         raise
     except (ImportError, UnicodeError):  # trimesh then wants a package to guess the encoding, which is no help here
@@ -55,18 +53,18 @@ def read_mesh(path: Path, model: Model, *, up: str | None, unit: str | float | N
     return assemble(model)
 
 
-def _take_obj(path: Path, model: Model, to_model: np.ndarray, doors: str) -> None:
+def _take_obj(path: Path, model: Model, to_model: np.ndarray, roles: RoleRules) -> None:
     vertices, groups = read_obj(path)
     for at, group in enumerate(groups):
         points, faces = _used(vertices, np.array(group.faces))
-        role, kind = named_role(group.name, group.material, doors)
-        role = role if group.alpha >= OPAQUE_ALPHA else Role.TRANSPARENT
-        model.parts.append(Part(group.name, kind, role, at, points, faces, to_model))
+        clear = "" if group.alpha >= OPAQUE_ALPHA else f"opacity {group.alpha:g} of {group.material!r}"
+        taken = roles.of_mesh(group.name, group.material, clear)
+        model.parts.append(Part(group.name, taken.kind, taken.role, at, points, faces, to_model, why=taken.why))
     if not groups:
         raise InputError(f"{path}: expected faces, found {len(vertices)} vertices and none")
 
 
-def _take_scene(path: Path, model: Model, to_model: np.ndarray, doors: str) -> None:
+def _take_scene(path: Path, model: Model, to_model: np.ndarray, roles: RoleRules) -> None:
     import trimesh
 
     loaded = trimesh.load_scene(str(path), process=False)
@@ -77,13 +75,13 @@ def _take_scene(path: Path, model: Model, to_model: np.ndarray, doors: str) -> N
             model.skip(str(node), f"{type(mesh).__name__}: no triangles")
             continue
         material = getattr(mesh.visual, "material", None)
-        role, kind = named_role(f"{node} {shape}", str(getattr(material, "name", "") or ""), doors)
-        role = Role.TRANSPARENT if _see_through(material) else role
+        clear = "a material that lets light pass" if _see_through(material) else ""
+        taken = roles.of_mesh(f"{node} {shape}", str(getattr(material, "name", "") or ""), clear)
         transform = to_model @ np.asarray(placement, np.float64)
         points, faces = _used(np.array(mesh.vertices, np.float64), np.array(mesh.faces))
         # By content: some writers repeat the geometry of every instance.
         content = (points.tobytes(), faces.tobytes())
-        model.parts.append(Part(str(node), kind, role, content, points, faces, transform))
+        model.parts.append(Part(str(node), taken.kind, taken.role, content, points, faces, transform, why=taken.why))
     if not model.parts:
         raise InputError(f"{path}: expected triangles, found none")
 

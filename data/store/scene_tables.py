@@ -38,6 +38,7 @@ def meshes_table(scene: Scene) -> pa.Table:
             "error_m": pa.array([mesh.error_m for _, _, mesh in rows], pa.float64()),
             "vertices": _lists(vertices, np.float32),
             "faces": _lists([mesh.faces for _, _, mesh in rows], np.int32),
+            **_colour_columns([mesh for _, _, mesh in rows]),
         },
         metadata={"definition_names": json.dumps([shape.name for shape in scene.definitions])},
     )
@@ -54,6 +55,7 @@ def objects_table(scene: Scene) -> pa.Table:
         "transform": _lists([placed.transform for placed in scene.objects], np.float64),
         "opaque": pa.array([placed.opaque for placed in scene.objects], pa.bool_()),
         "role": pa.array([placed.role.value for placed in scene.objects], pa.string()),
+        "guid": pa.array([placed.guid or None for placed in scene.objects], pa.string()),
     }
     return pa.table(columns | _box_columns(boxes * scene.grid_m, empty=boxes[:, 0, 0] > boxes[:, 1, 0]))
 
@@ -124,6 +126,7 @@ def _definitions(meshes: pa.Table) -> list[Definition]:
     ids, lods = meshes["definition_id"].to_pylist(), meshes["lod"].to_pylist()
     errors = meshes["error_m"].to_pylist()
     vertices, faces = _arrays(meshes["vertices"], 3), _arrays(meshes["faces"], 3)
+    colours = _colours(meshes, faces)
     levels: list[list[Mesh]] = []
     for row, (definition_id, lod) in enumerate(zip(ids, lods, strict=True)):
         where = f"meshes.parquet: row {row}"
@@ -132,16 +135,47 @@ def _definitions(meshes: pa.Table) -> list[Definition]:
         if definition_id != len(levels) - 1 or lod != len(levels[-1]):
             raise InputError(f"{where}: expected rows in order of definition_id and lod, found {definition_id}, {lod}")
         _check_faces(faces[row], len(vertices[row]), where)
-        levels[-1].append(Mesh(vertices[row].astype(np.float64), faces[row].astype(np.int32), float(errors[row])))
+        points, corners = vertices[row].astype(np.float64), faces[row].astype(np.int32)
+        levels[-1].append(Mesh(points, corners, float(errors[row]), colours[row]))
     names = names if len(names) == len(levels) else [f"definition {i}" for i in range(len(levels))]
     return [Definition(name, tuple(meshes)) for name, meshes in zip(names, levels, strict=True)]
 
 
+def _colour_columns(meshes: list[Mesh]) -> dict[str, pa.Array]:
+    """Base colours by runs of faces: where each run begins, and its 0xRRGGBBAA; empty lists where none is known."""
+    starts, colours = [], []
+    for mesh in meshes:
+        packed = np.zeros(0, np.uint32) if mesh.colours is None else mesh.colours.view(">u4")[:, 0].astype(np.uint32)
+        begins = np.flatnonzero(np.append(np.ones(min(1, len(packed)), bool), packed[1:] != packed[:-1]))
+        starts.append(begins)
+        colours.append(packed[begins])
+    return {"colour_starts": _lists(starts, np.int32), "colours": _lists(colours, np.uint32)}
+
+
+def _colours(meshes: pa.Table, faces: list[np.ndarray]) -> list[np.ndarray | None]:
+    # Folders of before 0.2 have no colours.
+    if "colours" not in meshes.column_names:
+        return [None] * len(faces)
+    found: list[np.ndarray | None] = []
+    for row, (begins, packed) in enumerate(
+        zip(_arrays(meshes["colour_starts"], 1), _arrays(meshes["colours"], 1), strict=True)
+    ):
+        lengths = np.diff(np.append(begins.ravel(), len(faces[row])))
+        if len(begins) != len(packed) or (len(begins) and (begins[0, 0] != 0 or (lengths < 0).any())):
+            where = f"meshes.parquet: row {row}"
+            raise InputError(f"{where}: expected runs of coloured faces from 0 upwards, found {len(begins)} others")
+        runs = packed.ravel().astype(">u4").view(np.uint8).reshape(-1, 4)
+        found.append(np.repeat(runs, lengths, axis=0) if len(runs) else None)
+    return found
+
+
 def _objects(objects: pa.Table) -> list[Instance]:
     columns = ("object_id", "name", "kind", "definition_id", "role")
-    rows = zip(*(objects[name].to_pylist() for name in columns), _arrays(objects["transform"], 4), strict=True)
+    # Folders of before 0.2 have no GUIDs.
+    guids = objects["guid"].to_pylist() if "guid" in objects.column_names else [None] * objects.num_rows
+    rows = zip(*(objects[name].to_pylist() for name in columns), _arrays(objects["transform"], 4), guids, strict=True)
     found = []
-    for row, (object_id, name, kind, definition_id, role, transform) in enumerate(rows):
+    for row, (object_id, name, kind, definition_id, role, transform, guid) in enumerate(rows):
         where = f"objects.parquet: row {row}"
         if object_id != row:
             raise InputError(f"{where}: expected object_id {row}, found {object_id}")
@@ -149,7 +183,7 @@ def _objects(objects: pa.Table) -> list[Instance]:
             raise InputError(f"{where}: expected role occluder, detail or transparent, found {role!r}")
         if transform.shape != (4, 4) or not np.isfinite(transform).all():
             raise InputError(f"{where}: expected a transform of 16 finite numbers, found {transform.size}")
-        found.append(Instance(name, kind, definition_id, transform.astype(np.float64), Role(role)))
+        found.append(Instance(name, kind, definition_id, transform.astype(np.float64), Role(role), guid or ""))
     return found
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from viewcell.data.errors import InputError
 from viewcell.data.readers import read
-from viewcell.data.readers.roles import ifc_role, named_role
+from viewcell.data.readers.roles import RoleRules
 from viewcell.data.scene import GRID_M, Role, Scene
 from viewcell.data.store.scene_folder import read_scene, write_scene
 
@@ -43,9 +43,12 @@ def test_roles_follow_inheritance_not_exact_names(kind):
     import ifcopenshell
 
     entity = ifcopenshell.file(schema="IFC4").create_entity(kind)
-    assert ifc_role(entity.is_a, "", "open") is INHERITANCE[kind]
+    assert RoleRules().of_product(entity.is_a, "", kind).role is INHERITANCE[kind]
     if kind != "IfcPlate":
-        assert named_role(f"1|{kind}|a", "", "open") == (INHERITANCE[kind], kind)
+        assert (named := RoleRules().of_mesh(f"1|{kind}|a", "")) and (named.role, named.kind) == (
+            INHERITANCE[kind],
+            kind,
+        )
 
 
 def test_role_needs_more_than_the_class():
@@ -53,9 +56,9 @@ def test_role_needs_more_than_the_class():
 
     file = ifcopenshell.file(schema="IFC4")
     door, proxy, plate = (file.create_entity(kind) for kind in ("IfcDoor", "IfcBuildingElementProxy", "IfcPlate"))
-    assert ifc_role(door.is_a, "", "closed") is Role.OCCLUDER
-    assert ifc_role(proxy.is_a, "Office chair 12", "open") is Role.DETAIL
-    assert ifc_role(plate.is_a, "", "open", in_curtain_wall=True) is Role.TRANSPARENT
+    assert RoleRules("closed").of_product(door.is_a, "", "IfcDoor").role is Role.OCCLUDER
+    assert RoleRules().of_product(proxy.is_a, "Office chair 12", "").role is Role.DETAIL
+    assert RoleRules().of_product(plate.is_a, "", "", in_curtain_wall=True).role is Role.TRANSPARENT
 
 
 class Step:

@@ -14,9 +14,9 @@ from viewcell.data.store.bake_folder import BakeFolder, read_bake, write_bake
 GRID_M = 2.0**-10
 WITNESS = ["origin_x", "origin_y", "origin_z", "direction_x", "direction_y", "direction_z"]
 COLUMNS = {
-    "meshes": ["definition_id", "lod", "error_m", "vertices", "faces"],
+    "meshes": ["definition_id", "lod", "error_m", "vertices", "faces", "colour_starts", "colours"],
     "objects": [
-        *("object_id", "name", "kind", "definition_id", "transform", "opaque", "role"),
+        *("object_id", "name", "kind", "definition_id", "transform", "opaque", "role", "guid"),
         *("min_x", "min_y", "min_z", "max_x", "max_y", "max_z"),
     ],
     "cells": ["cell_id", "min_x", "min_y", "min_z", "max_x", "max_y", "max_z", "inhabitable", "name"],
