@@ -111,6 +111,7 @@ class Scene:
         sha256: of the source file; empty for generated scenes.
         unit: the unit of the source file, e.g. "metre".
         skipped: what could not be read, as {"what": name, "why": reason}.
+        notes: what was read otherwise than it is written, or is not as files of its kind should be, likewise.
     """
 
     definitions: list[Definition]
@@ -123,6 +124,7 @@ class Scene:
     sha256: str = ""
     unit: str = "metre"
     skipped: list[dict[str, str]] = field(default_factory=list)
+    notes: list[dict[str, str]] = field(default_factory=list)
 
     def world_vertices(self, object_id: int, lod: int = 0) -> np.ndarray:
         """Snapped world vertices of one object [grid steps], shape (n, 3), int32.

@@ -48,7 +48,7 @@ class Model:
 
     Attributes:
         openings: boxes [m], each of shape (2, 3).
-        skipped: as in `Scene`.
+        skipped, notes: as in `Scene`.
     """
 
     source: str
@@ -59,10 +59,15 @@ class Model:
     spaces: list[Space] = field(default_factory=list)
     openings: list[np.ndarray] = field(default_factory=list)
     skipped: list[dict[str, str]] = field(default_factory=list)
+    notes: list[dict[str, str]] = field(default_factory=list)
 
     def skip(self, what: str, why: str) -> None:
         """Note a part that could not be read."""
         self.skipped.append({"what": what, "why": why})
+
+    def note(self, what: str, why: str) -> None:
+        """Note a part that was read otherwise than it is written, or that is not as it should be."""
+        self.notes.append({"what": what, "why": why})
 
 
 def assemble(model: Model) -> Scene:
@@ -88,6 +93,7 @@ def assemble(model: Model) -> Scene:
         sha256=model.sha256,
         unit=model.unit,
         skipped=model.skipped,
+        notes=model.notes,
     )
 
 

@@ -86,6 +86,7 @@ def scene_manifest(scene: Scene) -> dict[str, object]:
             "skipped": len(scene.skipped),
         },
         "skipped": scene.skipped,
+        "notes": scene.notes,
     }
 
 

@@ -99,6 +99,7 @@ def scene_from_tables(
         sha256=str(manifest.get("sha256", "")),
         unit=str(manifest.get("unit", "metre")),
         skipped=list(manifest.get("skipped", [])),
+        notes=list(manifest.get("notes", [])),
     )
     if scene.origin.shape != (3,) or not np.isfinite(scene.origin).all():
         raise InputError(f"manifest.json: expected origin to be 3 finite numbers, found {manifest['origin']}")
