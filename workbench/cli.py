@@ -144,8 +144,7 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
     bake = _command(commands, "bake", "bake", "Compute what can be seen from each cell of a model.")
     bake.add_argument("model", metavar="MODEL", help="IFC, glTF, OBJ, PLY, STL, a scene folder, or cells and portals")
     bake.add_argument("--out", metavar="BAKE", help="folder to write; MODEL's name with .bake by default")
-    bake.add_argument("--up", choices=["y", "z"], help="axis that points up in a mesh file")
-    bake.add_argument("--unit", help="unit of a mesh file, a name or metres; metre by default")
+    _add_numbers(bake)
     bake.add_argument(
         "--budget", type=_number, metavar="SECONDS", help="stop refining then; the rest is unknown, never hidden"
     )
@@ -159,6 +158,23 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
         help="JSON with keys of Settings, or a file that viewcell tune has written; options given here go before it",
     )
     _add_settings(bake.add_argument_group("what the answer depends on"))
+
+
+def _add_numbers(parser: argparse.ArgumentParser) -> None:
+    """How the numbers of a mesh file are meant."""
+    parser.add_argument("--up", choices=["y", "z"], help="axis that points up in a mesh file")
+    parser.add_argument("--unit", help="unit of a mesh file, a name or metres; metre by default")
+
+
+def _add_roles(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
+    """What the parts of a model file do to sight."""
+    parser.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")
+    for option, text in (
+        ("--glass", "regular expression for names and materials of glass, in place of the words for it"),
+        ("--doors-by", "regular expression for names of doors, in place of the words for them"),
+        ("--leave-out", "regular expression for names, GUIDs or kinds of what is not to be read"),
+    ):
+        parser.add_argument(option, metavar="PATTERN", help=text)
 
 
 def _add_settings(group: argparse._ArgumentGroup) -> None:
@@ -182,7 +198,7 @@ def _add_settings(group: argparse._ArgumentGroup) -> None:
         ("--lods", "simplify shapes that have one level, and say which level does from where"),
     ):
         group.add_argument(option, action="store_true", default=None, help=text)
-    group.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")
+    _add_roles(group)
     group.add_argument(
         "--method",
         choices=["auto", "portals", "occluders", "both", "vlod"],
@@ -233,9 +249,8 @@ def _add_check(commands: argparse._SubParsersAction) -> None:
         "--targets", choices=["objects", "cells"], help="what a matrix's columns are, if its shape leaves a doubt"
     )
     check.add_argument("--rays", type=_whole(1), default=4_000_000, help="to cast; 4,000,000 by default")
-    check.add_argument("--up", choices=["y", "z"], help="axis that points up in a mesh file")
-    check.add_argument("--unit", help="unit of a mesh file, a name or metres; metre by default")
-    check.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")
+    _add_numbers(check)
+    _add_roles(check)
     check.add_argument("--out", metavar="FOLDER", help="where to write all sightlines and the cells' numbers")
     check.add_argument("--shown", type=_whole(1), default=10, help="lines of each table; 10 by default")
     check.add_argument("--replay", metavar="FOLDER", help="judge the sightlines in an earlier check's folder again")

@@ -79,12 +79,10 @@ def bake(options: argparse.Namespace) -> int:
     given = {name: value for name, value in asked.items() if value is not None}
     file = read_settings(options.settings) if options.settings else SettingsFile({}, {})
     settings = Settings(**(file.settings | given))
-    # The reader of the model is told, too.
-    options.doors = settings.doors if settings.doors == "closed" else options.doors
     out = Path(options.out) if options.out else default_out(model)
     before = _stamp(out)
     made = compute(
-        _read(model, options),
+        _read(model, options, settings.reading),
         out,
         settings=settings,
         budget_s=options.budget,
@@ -101,15 +99,22 @@ def bake(options: argparse.Namespace) -> int:
     return 0
 
 
-def _read(model: Path, options: argparse.Namespace) -> object:
-    """The model as `bake` takes it: a scene where options say how to read the file, else its path."""
-    if model.is_dir() and (options.up or options.unit or options.doors == "closed"):
-        raise InputError(f"{model}: expected a model file beside --up, --unit and closed doors, found a folder")
+def _read(model: Path, options: argparse.Namespace, reading: dict[str, str]) -> object:
+    """The model as `bake` takes it: a scene where options say how to read the numbers of the file, else its path."""
     if options.up is None and options.unit is None:
         return model
+    if model.is_dir():
+        raise InputError(f"{model}: expected a model file beside --up and --unit, found a folder")
     from ..data.readers import read
 
-    return read(model, up=options.up, unit=_unit(options.unit), doors=options.doors or "open")
+    return read(model, up=options.up, unit=_unit(options.unit), **reading)
+
+
+def _reading(options: argparse.Namespace) -> dict[str, object]:
+    """Options of `read` that were given."""
+    asked = {name: getattr(options, name) for name in ("up", "doors", "glass", "doors_by", "leave_out")}
+    asked["unit"] = _unit(options.unit)
+    return {name: value for name, value in asked.items() if value is not None}
 
 
 def _unit(text: str | None) -> str | float | None:
@@ -192,10 +197,8 @@ def check(options: argparse.Namespace) -> int:
         rays=options.rays,
         seed=options.seed,
         targets=options.targets,
-        up=options.up,
-        unit=_unit(options.unit),
-        doors=options.doors or "open",
         progress=_progress(options),
+        **_reading(options),
     )
     say(result.table(options.shown))
     if options.out:

@@ -121,13 +121,13 @@ def _open(model: Scene | str | Path, settings: Settings) -> tuple[Scene | None, 
     if isinstance(model, Scene):
         return model, None
     path = Path(model)
-    if path.is_dir() and settings.doors != "open":
-        raise InputError(f"{path}: expected a model file to close the doors of, found a folder")
+    if path.is_dir() and settings.reading:
+        raise InputError(f"{path}: expected a model file beside {', '.join(settings.reading)}, found a folder")
     if path.is_dir() and not (path / "manifest.json").exists():
         return None, path
     from ...data.readers import read
 
-    return read(path, doors=settings.doors), None
+    return read(path, **settings.reading), None
 
 
 def default_out(model: Scene | str | Path) -> Path:

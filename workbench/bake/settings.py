@@ -22,13 +22,25 @@ class ModelSettings:
 
     Attributes:
         doors: "open", or "closed" if doors occlude.
+        glass: as for `read`: regular expression in place of the words for glass and windows in names.
+        doors_by: in place of the words for doors.
+        leave_out: parts whose name, GUID or kind it finds are not read.
         seal: cracks narrower than this are closed [m]; 0 closes none.
         split: connected components become objects of their own.
     """
 
     doors: str = "open"
+    glass: str = ""
+    doors_by: str = ""
+    leave_out: str = ""
     seal: float = 0.0
     split: bool = False
+
+    @property
+    def reading(self) -> dict[str, str]:
+        """What `read` is told that it would not assume."""
+        asked = {"doors": self.doors, "glass": self.glass, "doors_by": self.doors_by, "leave_out": self.leave_out}
+        return {name: value for name, value in asked.items() if value not in ("", "open")}
 
 
 @dataclass(frozen=True)

@@ -148,7 +148,9 @@ def _by_triangles(
     model: Path, asked: dict, facts: dict, rows: pa.Table, boxes: np.ndarray, origins: np.ndarray, ends: np.ndarray
 ) -> np.ndarray:
     """Which sightlines the triangles of a model leave clear, shape (n,), bool."""
-    opened = open_model(model, asked.get("up"), asked.get("unit"), asked.get("doors", "open"))
+    # Checks of before 0.2 name three options of `read` beside the others.
+    before = {name: asked[name] for name in ("up", "unit", "doors") if asked.get(name)}
+    opened = open_model(model, asked.get("reading", before))
     scene = opened[0] if isinstance(opened, tuple) else None
     if scene is None or not np.array_equal(scene.origin, facts["origin"]) or scene.grid_m != facts["grid"]:
         raise InputError(f"{model}: expected a model at {facts['origin']} m, found another")

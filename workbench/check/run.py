@@ -45,10 +45,8 @@ def check(
     rays: int = RAYS,
     seed: int = 0,
     targets: str | None = None,
-    up: str | None = None,
-    unit: str | float | None = None,
-    doors: str = "open",
     progress: bool = False,
+    **reading: object,
 ) -> CheckResult:
     """Look for visible things that claimed sets hide.
 
@@ -62,10 +60,8 @@ def check(
         rays: to cast.
         seed: of the rays.
         targets: "objects" or "cells", where a matrix could have either as columns.
-        up: axis that points up in a mesh file, as for `read`.
-        unit: unit of a mesh file, as for `read`.
-        doors: "open" or "closed", as for `read`.
         progress: show a bar.
+        reading: how a model file is read: options of `read`, such as `unit` and `doors`.
 
     Returns:
         All wrong-hidden pairs that were found, each with a sightline that exact arithmetic confirms. None found does
@@ -83,7 +79,7 @@ def check(
         return check_map(Path(model), _sources(pvs), cells, rays=rays, seed=seed, targets=targets, progress=progress)
     if pvs is None:
         raise InputError(f"{model}: expected claims beside it, found none")
-    opened = open_model(model, up, unit, doors)
+    opened = open_model(model, reading)
     if isinstance(opened, CellGraph):
         from .graph import check_graph
 
@@ -97,7 +93,7 @@ def check(
     hunt.result.seconds["read"] = time.perf_counter() - start
     hunt.run(progress)
     path = None if isinstance(model, Scene) else str(Path(model).resolve())
-    hunt.result.asked = {"model": path, "judge": "triangles", "up": up, "unit": unit, "doors": doors}
+    hunt.result.asked = {"model": path, "judge": "triangles", "reading": reading}
     return hunt.result
 
 
@@ -136,10 +132,8 @@ def _sources(pvs: object) -> Sequence[object]:
     return [] if pvs is None else list(pvs) if isinstance(pvs, list | tuple) else [pvs]
 
 
-def open_model(
-    model: Scene | str | Path, up: str | None, unit: str | float | None, doors: str
-) -> tuple[Scene, Path | None] | CellGraph:
-    """The model, and where its own view cells are; or a bare graph.
+def open_model(model: Scene | str | Path, reading: dict[str, object]) -> tuple[Scene, Path | None] | CellGraph:
+    """The model, and where its own view cells are; or a bare graph. `reading` has options of `read`.
 
     Raises:
         InputError: it is unreadable.
@@ -147,8 +141,9 @@ def open_model(
     if isinstance(model, Scene):
         return model, None
     path = Path(model)
-    if path.is_dir() and (up or unit or doors != "open"):
-        raise InputError(f"{path}: expected a model file beside up, unit and closed doors, found a folder")
+    told = [name for name, value in reading.items() if value not in (None, "", "open")]
+    if path.is_dir() and told:
+        raise InputError(f"{path}: expected a model file beside {', '.join(told)}, found a folder")
     if path.is_dir() and not (path / "manifest.json").exists():
         from ...data.store.graph_folder import read_graph
 
@@ -160,7 +155,7 @@ def open_model(
         return bake.graph if bake.scene is None else (bake.scene, path)
     from ...data.readers import read
 
-    return read(path, up=up, unit=unit, doors=doors), None
+    return read(path, **reading), None
 
 
 def read_kind(folder: Path) -> str:

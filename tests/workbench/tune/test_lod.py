@@ -222,7 +222,7 @@ def test_settings_come_from_the_file_unless_given(graph, tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('{"sede": 1}', "expected keys among doors, seal"),
+        ('{"sede": 1}', "expected keys among doors, glass"),
         ('{"seed": 1.5}', "expected seed to be like 0, found 1.5"),
         ('{"seed": true}', "expected seed to be like 0, found True"),
         ('{"certify": 1}', "expected certify to be like false, found 1"),
