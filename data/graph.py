@@ -40,6 +40,11 @@ class CellGraph:
         """Number of portals."""
         return len(self.portals)
 
+    def with_portals(self, chosen: np.ndarray) -> "CellGraph":
+        """The same cells with some of the portals: indices or a mask."""
+        kept = self.portal_cells[chosen], self.portal_axis[chosen], self.portals[chosen]
+        return CellGraph(self.cells, self.inhabitable, self.cell_names, *kept)
+
     def adjacency(self) -> tuple[np.ndarray, np.ndarray]:
         """Portals of each cell, as rows of a compressed table.
 

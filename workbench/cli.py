@@ -97,6 +97,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"viewcell {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_make(commands)
+    _add_inspect(commands)
     _add_bake(commands)
     _add_verify(commands)
     _add_check(commands)
@@ -140,6 +141,21 @@ def _add_make(commands: argparse._SubParsersAction) -> None:
         _seed(scaled, "what stands where")
 
 
+def _add_inspect(commands: argparse._SubParsersAction) -> None:
+    inspect = _command(
+        commands, "inspect", "inspect", "Tell whether a model is fit to bake, and what is wrong with it."
+    )
+    inspect.add_argument("model", metavar="MODEL", help="as for bake")
+    _add_numbers(inspect)
+    _add_roles(inspect)
+    inspect.add_argument("--json", action="store_true", help="everything, for programs")
+    inspect.add_argument(
+        "--referee", action="store_true", help="read the file a second time by another way, and compare"
+    )
+    inspect.add_argument("--picture", metavar="FILE", help="plan of cracks and leaks, as .png or .svg")
+    inspect.add_argument("--no-estimate", action="store_true", help="do not try how long a bake takes")
+
+
 def _add_bake(commands: argparse._SubParsersAction) -> None:
     bake = _command(commands, "bake", "bake", "Compute what can be seen from each cell of a model.")
     bake.add_argument("model", metavar="MODEL", help="IFC, glTF, OBJ, PLY, STL, a scene folder, or cells and portals")
@@ -180,6 +196,13 @@ def _add_roles(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> Non
 def _add_settings(group: argparse._ArgumentGroup) -> None:
     """Options that are settings of a bake, under their names in `Settings`; None where the user says nothing."""
     for option, of, metavar, read, text in (
+        (
+            "--seal",
+            "seal",
+            "M",
+            _number,
+            "close cracks narrower than this, and list what only that hides; 0 by default",
+        ),
         ("--cells", "cells", "FILE", str, "a table of boxes, or octree, or portals; the method's own by default"),
         ("--threshold", "threshold_m2", "M2", _number, "planes with less opaque area do not cut cells"),
         ("--cell-size", "cell_size_m", "M", _number, "of an octree's roots; 4 by default"),

@@ -4,6 +4,7 @@ Nothing heavy is imported before it is needed: an argument that is wrong is refu
 """
 
 import argparse
+import json
 import os
 import sys
 import tempfile
@@ -64,6 +65,22 @@ def _scene_writer(name: str) -> tuple[Path, Callable[["Scene", Path], None]]:
     if out.suffix not in writers:
         raise InputError(f"out: expected a name ending in {' or '.join(writers)}, found {name!r}")
     return out, writers[out.suffix]
+
+
+def inspect(options: argparse.Namespace) -> int:
+    """Say whether a model is fit to bake; the exit code says so, too."""
+    _start_warp()
+    from .inspect.run import inspect as look
+
+    if options.picture and Path(options.picture).suffix.lower() not in (".png", ".svg"):
+        raise InputError(f"picture: expected a name ending in .png or .svg, found {options.picture!r}")
+    found = look(options.model, referee=options.referee, estimate=not options.no_estimate, **_reading(options))
+    say(json.dumps(found.json(), indent=1, ensure_ascii=False) if options.json else found.text())
+    if options.picture:
+        from .inspect.picture import draw
+
+        draw(found, Path(options.picture))
+    return 0 if found.ok else FAILED
 
 
 def bake(options: argparse.Namespace) -> int:

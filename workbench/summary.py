@@ -29,6 +29,12 @@ def summary(bake: "BakeFolder") -> str:
     if counts.get("potential_triangles"):
         share = 100.0 * counts["back_facing_triangles"] / counts["potential_triangles"]
         lines += [f"{share:.1f} % of the triangles in these sets face away from all of their cell", ""]
+    if "closed_cracks" in counts:
+        lines += [
+            f"{counts['closed_cracks']:,} cracks closed; that alone hides {counts['leak_cell_pairs']:,} pairs of cells "
+            f"and {counts['leak_object_pairs']:,} of cells and objects, listed in leaks.parquet",
+            "",
+        ]
     if "proofs" in counts:
         lines += [_certificates(bake), ""]
     lines.append("seconds: " + ", ".join(f"{name} {value:.1f}" for name, value in facts["seconds"].items()))

@@ -135,8 +135,7 @@ def make_judge(bake: "BakeFolder") -> Judge:
         nothing = Sightlines(np.zeros((0, 3, 3), np.int32))
         return Judge(bake.graph, None, nothing, links)
     lines, glass = (Sightlines(*bake.scene.triangles(*roles)) for roles in (OPAQUE, [Role.TRANSPARENT]))
-    seal = float(bake.manifest.get("settings", {}).get("seal", 0.0) or 0.0)
-    return Judge(bake.graph, lines, glass, links, seal / bake.grid_m)
+    return Judge(bake.graph, lines, glass, links, bake.cracks)
 
 
 def make_caster(

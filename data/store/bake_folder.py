@@ -26,6 +26,7 @@ WITNESS = ("origin_x", "origin_y", "origin_z", "direction_x", "direction_y", "di
 CELL_TO_CELL = ("cell_id", "reached_cell_id", "verdict", "portals", *WITNESS)
 CELL_TO_OBJECT = ("cell_id", "object_id", "verdict", *WITNESS)
 CELL_LODS = ("cell_id", "object_id", "lod")
+LEAKS = ("cell_id", "reached_cell_id", "object_id")
 
 
 class BakeFolder:
@@ -85,6 +86,21 @@ class BakeFolder:
         if not path.exists():
             return pa.table({name: pa.array([], pa.int32()) for name in CELL_LODS})
         return read_table(path, CELL_LODS)
+
+    @cached_property
+    def cracks(self) -> np.ndarray:
+        """Openings that a seal closed: flat boxes [grid steps], shape (n, 2, 3), int32; none in a bake without one."""
+        if not (self.folder / "cracks.parquet").exists():
+            return np.zeros((0, 2, 3), np.int32)
+        return read_graph(self.folder, self.grid_m, disjoint=self.claims_cells, portals="cracks")[0].portals
+
+    @cached_property
+    def leaks(self) -> pa.Table:
+        """Pairs that only a seal hides: cell_id, and the object_id or the reached_cell_id that is hidden."""
+        path = self.folder / "leaks.parquet"
+        if not path.exists():
+            return leaks_table(np.zeros((0, 2), int), np.zeros((0, 2), int))
+        return read_table(path, LEAKS)
 
     @cached_property
     def potential_cells(self) -> np.ndarray:
@@ -240,6 +256,15 @@ def portals_table(graph: CellGraph, grid_m: float) -> pa.Table:
         "axis": pa.array(graph.portal_axis),
     }
     return pa.table(columns | {name: pa.array(x) for name, x in zip(PORTAL_COLUMNS[4:], values, strict=True)})
+
+
+def leaks_table(cells: np.ndarray, objects: np.ndarray) -> pa.Table:
+    """Rows of leaks.parquet from pairs (source, cell) and (source, object); the other column is null."""
+    pairs = np.concatenate([cells, objects]).astype(np.int32).reshape(-1, 2)
+    is_cell = np.arange(len(pairs)) < len(cells)
+    columns = pairs[:, 0], pairs[:, 1], pairs[:, 1]
+    masks = None, ~is_cell, is_cell
+    return pa.table({name: pa.array(x, mask=m) for name, x, m in zip(LEAKS, columns, masks, strict=True)})
 
 
 def _witness_columns(rows: Rows, grid_m: float) -> dict[str, pa.Array]:

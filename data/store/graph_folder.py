@@ -31,18 +31,21 @@ def numbers(table: pa.Table, names: tuple[str, ...], path: Path) -> np.ndarray:
     return out.reshape(table.num_rows, len(names))
 
 
-def read_graph(folder: Path, grid_m: float = GRID_M, *, disjoint: bool = True) -> tuple[CellGraph, float]:
+def read_graph(
+    folder: Path, grid_m: float = GRID_M, *, disjoint: bool = True, portals: str = "portals"
+) -> tuple[CellGraph, float]:
     """The graph of a folder, snapped to the grid, and the largest displacement by snapping [m].
 
     Args:
         folder: with cells.parquet and portals.parquet.
         grid_m: grid step [m].
         disjoint: refuse cells that overlap; view cells may.
+        portals: name of their table.
 
     Raises:
         InputError: the tables are unreadable or contradict each other or themselves.
     """
-    cells_path, portals_path = Path(folder) / "cells.parquet", Path(folder) / "portals.parquet"
+    cells_path, portals_path = Path(folder) / "cells.parquet", Path(folder) / f"{portals}.parquet"
     table = read_table(cells_path, CELL_COLUMNS)
     if table.num_rows == 0:
         raise InputError(f"{cells_path}: expected at least one cell, found an empty table")
@@ -56,9 +59,9 @@ def read_graph(folder: Path, grid_m: float = GRID_M, *, disjoint: bool = True) -
     order = np.argsort(ids)
     inhabitable = inhabitable_column(table, cells_path)[order]
     names = optional_column(table, "name", "")[order]
-    portals = read_table(portals_path, PORTAL_COLUMNS)
-    ends = numbers(portals, ("cell_a", "cell_b", "axis"), portals_path).astype(np.int64)
-    flat = numbers(portals, PORTAL_COLUMNS[4:], portals_path)
+    rows = read_table(portals_path, PORTAL_COLUMNS)
+    ends = numbers(rows, ("cell_a", "cell_b", "axis"), portals_path).astype(np.int64)
+    flat = numbers(rows, PORTAL_COLUMNS[4:], portals_path)
     _check_ids(ends, len(ids), portals_path)
     boxes, portals_moved = _snap(_portal_boxes(ends[:, 2], flat), grid_m, portals_path)
     graph = CellGraph(cells, inhabitable, names, ends[:, :2].astype(np.int32), ends[:, 2].astype(np.int8), boxes)

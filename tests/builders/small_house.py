@@ -1,6 +1,6 @@
 """A house of boxes with an exactly known potentially visible set, shaped like a bake."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 
@@ -32,6 +32,7 @@ class StandIn:
     cell_to_object: pa.Table
     potential_cells: np.ndarray
     potential_objects: np.ndarray
+    cracks: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3), np.int32))
     claims_cells: bool = True
 
 

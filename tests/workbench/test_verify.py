@@ -15,6 +15,7 @@ from viewcell.data.graph import OTHER_AXES, CellGraph
 from viewcell.data.store.scene_folder import write_scene
 from viewcell.data.verdict import Verdict
 from viewcell.verify.cases.case_file import WrongHidden, load_cases, read_case, write_case
+from viewcell.verify.exact.segment import meets_flat_box
 from viewcell.verify.exact.sightline import Sightlines
 from viewcell.verify.exact.trace import contact_links, portal_links
 from viewcell.verify.findings import VerifyResult
@@ -168,13 +169,15 @@ def test_a_missing_portal_is_found(house):
     assert verify_bake(house, rays=RAYS).wrong_hidden == 1
 
 
-def test_a_crack_is_a_leak_below_the_seal(house):
-    """Doorway 1 is 10 * 64 steps wide: a seal above that excuses what is seen through it, one below does not."""
+def test_what_is_seen_through_a_closed_crack_is_a_leak(house):
+    """Doorway 1 closed: that excuses what is seen through it, another does not."""
     judge = make_judge(house)
     origin, end = np.array([2500.0, 640.0, 640.0]), np.array([3600.0, 640.0, 640.0])
     assert judge.judge("cell", 0, 2, origin, end) is Judgement.VISIBLE
-    for seal, outcome in ((300, Judgement.VISIBLE), (700, Judgement.LEAK)):
-        house.manifest["settings"]["seal"] = seal * GRID
+    crosses = [meets_flat_box(origin, end, portal[None]) for portal in house.graph.portals]
+    assert 0 < sum(crosses) < len(crosses)
+    for crossed, outcome in ((False, Judgement.VISIBLE), (True, Judgement.LEAK)):
+        house.cracks = house.graph.portals[np.array(crosses) == crossed]
         assert make_judge(house).judge("cell", 0, 2, origin, end) is outcome
     house.potential_cells[0] = [True, False, False, False, False, False, False]
     result = verify_bake(house, rays=RAYS)

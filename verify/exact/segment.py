@@ -41,6 +41,28 @@ def crossing_time(origin: np.ndarray, end: np.ndarray, triangle: np.ndarray) -> 
     return Fraction(dot(normal, minus(a, o)), dot(normal, minus(e, o)))
 
 
+def meets_flat_box(origin: np.ndarray, end: np.ndarray, boxes: np.ndarray) -> bool:
+    """Whether the closed segment meets one of the closed flat boxes, shape (n, 2, 3); exact."""
+    low, high = np.minimum(origin, end), np.maximum(origin, end)
+    # Outside the segment's own box there is nothing to compute.
+    near = ((boxes[:, 0] <= high) & (boxes[:, 1] >= low)).all(axis=1)
+    start, way = (
+        [Fraction(float(x)) for x in origin],
+        [Fraction(float(b)) - Fraction(float(a)) for a, b in zip(origin, end, strict=True)],
+    )
+    for box in boxes[near].tolist():
+        first, last = Fraction(0), Fraction(1)
+        for x, d, a, b in zip(start, way, *box, strict=True):
+            if d == 0:
+                # The segment's box told so already.
+                continue
+            times = sorted([(a - x) / d, (b - x) / d])
+            first, last = max(first, times[0]), min(last, times[1])
+        if first <= last:
+            return True
+    return False
+
+
 def column_crossing(point: np.ndarray, triangle: np.ndarray) -> tuple[int, bool]:
     """Signed crossing of the column above a point with a triangle, and whether the point lies on the triangle.
 

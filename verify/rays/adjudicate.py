@@ -1,14 +1,14 @@
 """Is a pair that the bake hides really visible? Exact judgement of candidate rays."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
 
 from ...data.graph import CellGraph
 from ..exact.segment import BLOCKED as THROUGH
-from ..exact.segment import crossing_time
-from ..exact.sightline import Sight, Sightlines
+from ..exact.segment import crossing_time, meets_flat_box
+from ..exact.sightline import Sightlines
 from ..exact.trace import Links, portal_path
 from .embree import Candidates
 from .witness import Witnesses, passes_portals
@@ -35,14 +35,14 @@ class Judge:
         lines: opaque triangles; None for a bare graph, where passing portals is what visible means.
         glass: transparent triangles.
         links: portal links of a bare graph.
-        seal_steps: cracks narrower than this are leaks [grid steps]; 0 for none.
+        cracks: closed openings, as flat boxes [grid steps], shape (n, 2, 3): what is seen through them is a leak.
     """
 
     graph: CellGraph
     lines: Sightlines | None
     glass: Sightlines
     links: Links
-    seal_steps: float = 0.0
+    cracks: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3), np.int32))
 
     def judge(self, kind: str, cell: int, target: int, origin: np.ndarray, end: np.ndarray) -> Judgement:
         """Whether the sightline shows the target from the cell.
@@ -63,7 +63,7 @@ class Judge:
         found = (
             self._sees_object(target, origin, end) if kind == "object" else self._sees_cell(cell, target, origin, end)
         )
-        if found is Judgement.VISIBLE and self.lines is not None and self._is_crack(origin, end):
+        if found is Judgement.VISIBLE and meets_flat_box(origin, end, self.cracks):
             return Judgement.LEAK
         return found
 
@@ -76,7 +76,7 @@ class Judge:
         rows = np.flatnonzero(((origins > boxes[:, 0]) & (origins < boxes[:, 1])).all(axis=1))
         if self.lines is not None and len(rows):
             rows = rows[self.lines.outside_solids(origins[rows])]
-        if self.lines is None or self.seal_steps:
+        if self.lines is None or len(self.cracks):
             doubtful = np.ones(len(rows), bool)
         elif kind == "cell":
             doubtful = np.zeros(len(rows), bool)
@@ -132,21 +132,6 @@ class Judge:
         if not times[False] or first < min(times[False]):
             return Judgement.VISIBLE
         return Judgement.GRAZE if min(times[False]) < 0 else Judgement.BLOCKED
-
-    def _is_crack(self, origin: np.ndarray, end: np.ndarray) -> bool:
-        """Whether the sightline squeezes through a gap narrower than the seal: stopped when moved by it either way."""
-        if not self.seal_steps:
-            return False
-        along = (end - origin) / np.linalg.norm(end - origin)
-        first = np.cross(along, np.eye(3)[np.abs(along).argmin()])
-        first /= np.linalg.norm(first)
-        second = np.cross(along, first)
-        angles = np.arange(8) * np.pi / 8
-        shift = self.seal_steps * (np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second))
-        # A crack is looked for along the way, not where the sightline leaves or arrives.
-        ends = origin + 0.999 * (end - origin)
-        stopped = [self.lines.check(origin + s * shift, ends + s * shift) != Sight.CLEAR for s in (1, -1)]
-        return bool((stopped[0] & stopped[1]).any())
 
 
 def sightline_end(candidates: Candidates, number: int, cells: np.ndarray) -> np.ndarray:

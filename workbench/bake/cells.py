@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...data.cracks import crack_portals
 from ...data.errors import InputError
 from ...data.graph import CellGraph
 from ...data.inhabit import find_inhabitable
@@ -36,6 +37,7 @@ class Sources:
         view_cells: whether the cells are view cells, about which nothing but objects is claimed.
         method: what "auto" came to.
         portal_graph: the cell-and-portal graph beside view cells, if the method wants one.
+        closed: portals that a seal took out of `graph`; None if there is no seal.
     """
 
     model: PreparedModel | None
@@ -44,6 +46,7 @@ class Sources:
     view_cells: bool
     method: str
     portal_graph: CellGraph | None = None
+    closed: CellGraph | None = None
 
     @property
     def octree(self) -> bool:
@@ -57,6 +60,8 @@ def bare_sources(folder: Path, settings: Settings, clock: Clock) -> Sources:
     Raises:
         InputError: it is unreadable, or the settings want a model.
     """
+    if settings.seal:
+        raise InputError(f"{folder}: expected a model to seal, found a bare graph")
     if settings.split or settings.lods:
         raise InputError(f"{folder}: expected a model to split or to simplify, found a bare graph")
     if settings.method in ("occluders", "both", "vlod") or settings.cells not in ("", "portals"):
@@ -87,7 +92,14 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
         raise InputError("cells: expected octree or a table for the method vlod, found portals")
     if cells == "portals":
         graph, notes = build_graph(model, settings, clock)
-        return Sources(model, graph, facts | notes, False, method)
+        if not settings.seal:
+            return Sources(model, graph, facts | notes, False, method)
+        cracks = crack_portals(graph, settings.seal / scene.grid_m)
+        closed, graph = graph.with_portals(cracks), graph.with_portals(~cracks)
+        clock.lap("portals")
+        return Sources(model, graph, facts | notes, False, method, closed=closed)
+    if settings.seal:
+        raise InputError("seal: expected a model that is cut into portal cells, found one too large; --cells portals")
     if method == "auto":
         method = "occluders"
     # With certificates nothing is hidden by portals alone: the model is what a proof is checked against.

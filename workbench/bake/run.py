@@ -16,7 +16,7 @@ from ...data.lod import object_errors, split_components
 from ...data.prepared import PreparedModel
 from ...data.rows import Rows
 from ...data.scene import Scene
-from ...data.store.bake_folder import CELL_LODS, write_bake
+from ...data.store.bake_folder import CELL_LODS, leaks_table, portals_table, write_bake
 from ...data.store.certificates import certificate_tables, join_proofs
 from ...data.store.scene_folder import replaceable
 from ...solvers.levels.pixel_error import pixel_levels
@@ -159,6 +159,9 @@ def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dic
     graph, facts, clock = sources.graph, sources.facts, run.clock
     facts |= {"budget_spent": spent, **tuned}
     scene = None if sources.model is None else sources.model.scene
+    if sources.closed is not None:
+        extra |= _leaks(sources, (cell_rows, object_rows), run)
+        clock.lap("leaks")
     if sources.model is not None and not spent:
         facts["counts"] = facts["counts"] | _triangle_counts(sources.model, graph, object_rows, run.device)
         clock.lap("back faces")
@@ -173,6 +176,29 @@ def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dic
     if not spent:
         shutil.rmtree(partial_folder(run.out), ignore_errors=True)
     return Bake(run.out, written)
+
+
+def _leaks(sources: Sources, rows: tuple[Rows, Rows], run: _Run) -> dict[str, pa.Table]:
+    """Tables of the cracks that are closed and of the pairs that nothing else hides."""
+    from ...solvers.visibility.portal_engine import PortalEngine
+
+    graph, closed, scene = sources.graph, sources.closed, sources.model.scene
+    fields = "portal_cells", "portal_axis", "portals"
+    both = [np.concatenate([getattr(part, name) for part in (graph, closed)]) for name in fields]
+    whole = CellGraph(graph.cells, graph.inhabitable, graph.cell_names, *both)
+    engine = PortalEngine(sources.model, whole, method=sources.method, device=run.device)
+    parts = [engine.visible(block, aim=False) for block in in_blocks(sources)]
+    pairs = []
+    for open_rows, kept, targets in zip(engine.join(parts), rows, (graph.cell_count, len(scene.objects)), strict=True):
+        keys = [part.source.astype(np.int64) * targets + part.target for part in (open_rows, kept)]
+        pairs.append(np.column_stack(np.divmod(np.setdiff1d(*keys), targets)))
+    counts = {
+        "closed_cracks": closed.portal_count,
+        "leak_cell_pairs": len(pairs[0]),
+        "leak_object_pairs": len(pairs[1]),
+    }
+    sources.facts["counts"] = sources.facts["counts"] | counts
+    return {"cracks": portals_table(closed, scene.grid_m), "leaks": leaks_table(*pairs)}
 
 
 def _engine(sources: Sources, settings: Settings, device: "Device") -> "Engine":

@@ -25,7 +25,8 @@ class ModelSettings:
         glass: as for `read`: regular expression in place of the words for glass and windows in names.
         doors_by: in place of the words for doors.
         leave_out: parts whose name, GUID or kind it finds are not read.
-        seal: cracks narrower than this are closed [m]; 0 closes none.
+        seal: cracks narrower than this are closed [m]; 0 closes none. What is seen through them alone is then hidden
+            though visible, and listed in leaks.parquet.
         split: connected components become objects of their own.
     """
 
@@ -139,8 +140,8 @@ class Settings(LevelSettings, MethodSettings, CellSettings, ModelSettings):
             ("refine-gap", self.refine_gap, 0.0),
         ):
             check_number(name, value, least)
-        if self.seal > 0:
-            raise InputError(f"seal: expected 0 (closing cracks is not built yet), found {self.seal}")
+        if self.seal and (self.certify or self.method in ("occluders", "vlod") or self.cells not in ("", "portals")):
+            raise InputError("seal: expected cells of portals, by a method that goes through them, and no certificates")
         if self.method not in METHODS:
             raise InputError(f"method: expected {', '.join(METHODS)}, found {self.method!r}")
         if not 0 <= self.depth <= DEEPEST:

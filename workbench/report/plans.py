@@ -121,6 +121,15 @@ def section_lines(triangles: np.ndarray, section: Section) -> np.ndarray:
     return np.stack(ends, axis=1) if len(corners) else np.zeros((0, 2, 2))
 
 
+@dataclass(frozen=True)
+class Mark:
+    """Lines drawn over a plan [m], each of shape (n, 2), under one label."""
+
+    label: str
+    colour: str
+    lines: list[np.ndarray]
+
+
 class Painter:
     """Draws sections of one bake's graph and scene, in metres."""
 
@@ -147,6 +156,19 @@ class Painter:
         handles += [
             Patch(facecolor="none", edgecolor=OPENING, hatch="////", label="portal in a room's floor or ceiling")
         ]
+        _finish(figure, handles, path)
+
+    def marked(self, section: Section, marks: "list[Mark]", title: str, path: Path) -> None:
+        """Plan with lines drawn over it, written as PNG or SVG."""
+        figure, (axes,) = self._figure([section])
+        self._draw(axes, section, np.where(self.graph.inhabitable, "inhabitable", "other"))
+        handles = [Patch(facecolor=COLOURS["inhabitable"], edgecolor=CELL_EDGE, label="inhabitable cell")]
+        handles += self._geometry_handles()
+        for mark in marks:
+            style = {"colors": mark.colour, "linewidths": 2.2, "capstyle": "round", "zorder": 6}
+            axes.add_collection(LineCollection(mark.lines, **style))
+            handles.append(Line2D([], [], color=mark.colour, lw=2.2, label=f"{mark.label} ({len(mark.lines):,})"))
+        axes.set_title(title)
         _finish(figure, handles, path)
 
     def visible_set(
