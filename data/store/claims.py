@@ -35,7 +35,12 @@ class Claims:
 
 
 def read_claims(
-    sources: Sequence[object], view: ViewCells, object_names: Sequence[str], targets: str | None = None
+    sources: Sequence[object],
+    view: ViewCells,
+    object_names: Sequence[str],
+    targets: str | None = None,
+    *,
+    guids: Sequence[str] = (),
 ) -> Claims:
     """The claims of one or several tables.
 
@@ -46,6 +51,7 @@ def read_claims(
         view: the view cells, which claims name by id or by name.
         object_names: names of the model's objects; an object's id is its place.
         targets: "objects" or "cells": what the columns of a matrix stand for, where its shape leaves a doubt.
+        guids: of the model's objects, which stand for them as names do; empty where an object has none.
 
     Raises:
         InputError: a table is unreadable or empty, a claim is made twice, or names a cell or an object that is not
@@ -59,7 +65,7 @@ def read_claims(
             if isinstance(part, np.ndarray):
                 kind, matrix = _from_matrix(part, view, len(object_names), targets, where)
             else:
-                kind, matrix = _from_table(part, view, object_names, where)
+                kind, matrix = _from_table(part, view, [object_names, guids], where)
             if getattr(claims, kind) is not None:
                 raise InputError(f"{where}: expected the claims of {kind} once, found them a second time")
             setattr(claims, kind, matrix)
@@ -121,7 +127,9 @@ def _from_matrix(
     return kind, matrix.astype(bool)
 
 
-def _from_table(table: pa.Table, view: ViewCells, object_names: Sequence[str], where: str) -> tuple[str, np.ndarray]:
+def _from_table(
+    table: pa.Table, view: ViewCells, object_names: Sequence[Sequence[str]], where: str
+) -> tuple[str, np.ndarray]:
     """Which targets a table speaks of, and its pairs as bits."""
     found = [kind for kind, column in TARGETS.items() if column in table.column_names]
     if "cell_id" not in table.column_names or len(found) != 1:
@@ -130,15 +138,16 @@ def _from_table(table: pa.Table, view: ViewCells, object_names: Sequence[str], w
     if not table.num_rows:
         raise InputError(f"{where}: expected at least one claim, found an empty table")
     kind = found[0]
-    if kind == "object" and not object_names:
+    object_count = len(object_names[0])
+    if kind == "object" and not object_count:
         raise InputError(f"{where}: expected claims of cells for a model without objects, found claims of objects")
     cell_names = [str(name) for name in view.graph.cell_names]
-    sources = _places(table["cell_id"], view.ids, cell_names, "cell", where)
+    sources = _places(table["cell_id"], view.ids, [cell_names], "cell", where)
     if kind == "object":
-        reached = _places(table["object_id"], np.arange(len(object_names)), object_names, "object", where)
+        reached = _places(table["object_id"], np.arange(object_count), object_names, "object", where)
     else:
-        reached = _places(table["reached_cell_id"], view.ids, cell_names, "cell", where)
-    count = len(object_names) if kind == "object" else view.graph.cell_count
+        reached = _places(table["reached_cell_id"], view.ids, [cell_names], "cell", where)
+    count = object_count if kind == "object" else view.graph.cell_count
     keys = sources * count + reached
     values, times = np.unique(keys, return_counts=True)
     if (times > 1).any():
@@ -169,8 +178,10 @@ def _claimed(table: pa.Table, where: str) -> np.ndarray:
     return np.array([VERDICTS[value] for value in verdicts], bool)
 
 
-def _places(column: pa.ChunkedArray, ids: np.ndarray, names: Sequence[str], what: str, where: str) -> np.ndarray:
-    """Places of what a column names, by id or by name, shape (rows,), int64."""
+def _places(
+    column: pa.ChunkedArray, ids: np.ndarray, names: Sequence[Sequence[str]], what: str, where: str
+) -> np.ndarray:
+    """Places of what a column names, by id or by one of its names, shape (rows,), int64."""
     if pa.types.is_dictionary(column.type):
         column = column.cast(column.type.value_type)
     if column.null_count:
@@ -182,8 +193,10 @@ def _places(column: pa.ChunkedArray, ids: np.ndarray, names: Sequence[str], what
     known = {value: place for place, value in enumerate(ids.tolist())}
     values = column.to_pylist()
     if is_text:
-        uses = Counter(names)
-        named = {name: place for place, name in enumerate(names) if uses[name] == 1}
+        # A thing may bear one name twice.
+        bearers = {(name, place) for some in names for place, name in enumerate(some) if name}
+        uses = Counter(name for name, _ in bearers)
+        named = {name: place for name, place in bearers if uses[name] == 1}
         # Ids that are text themselves come before names, numbers that are written as text come after them.
         known = named | known if ids.dtype == object else {str(value): place for value, place in known.items()} | named
         shared = next((value for value in values if value not in known and uses[value] > 1), None)

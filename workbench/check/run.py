@@ -88,7 +88,8 @@ def check(
         return result
     scene, own_cells = opened
     view = _view_cells(cells if cells is not None else own_cells, scene, str(model))
-    claims = read_claims(_sources(pvs), view, [placed.name for placed in scene.objects], targets)
+    names, guids = ([getattr(placed, of) for placed in scene.objects] for of in ("name", "guid"))
+    claims = read_claims(_sources(pvs), view, names, targets, guids=guids)
     hunt = _Hunt(scene, view, claims, rays, seed)
     hunt.result.seconds["read"] = time.perf_counter() - start
     hunt.run(progress)

@@ -52,6 +52,19 @@ def test_numbers_written_as_text_are_ids_unless_they_are_names(view):
     assert np.argwhere(claims.objects).tolist() == [[0, 3], [1, 4], [2, 0]]
 
 
+def test_guids_stand_for_objects_as_names_do(view):
+    guids = ["2O2Fr$t4X7Zf8NOew3FKau", "1hOSvn6df7F8_7GcBWlRGQ", "", "twice", "twice"]
+    pairs = [("hall", guids[0]), ("hall", "lamp"), ("attic", guids[1])]
+    claims = read_claims([table(pairs)], view, NAMES, guids=guids)
+    assert np.array_equal(claims.objects, expected([(10, 0), (10, 3), (30, 1)]))
+    for shared in ("twice", "chair"):
+        with pytest.raises(InputError, match=f"found '{shared}' for 2"):
+            read_claims([table([("hall", shared)])], view, NAMES, guids=guids)
+    # An object whose name is its GUID bears one name.
+    same = read_claims([table([("hall", "table")])], view, NAMES, guids=["table", "", "", "", ""])
+    assert np.array_equal(same.objects, expected([(10, 0)]))
+
+
 def test_cells_see_themselves(view):
     claims = read_claims([table([(10, 20)], "reached_cell_id")], view, NAMES)
     assert claims.cells.tolist() == [[True, True, False], [False, True, False], [False, False, True]]
