@@ -9,7 +9,7 @@ from .assemble import Model
 from .roles import RoleRules
 
 IFC_SUFFIXES = (".ifc",)
-MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
+MESH_SUFFIXES = (".bsp", ".dxf", ".glb", ".gltf", ".obj", ".ply", ".stl")
 UP_CHOICES = (None, "y", "z")
 
 
@@ -27,9 +27,11 @@ def read(
     """The model in a file or scene folder, as a scene ready to bake.
 
     Args:
-        path: .ifc, .glb, .gltf, .obj, .ply, .stl, or a folder written by `write_scene`.
+        path: .ifc, .glb, .gltf, .obj, .ply, .stl, .dxf, .bsp (a compiled Quake map), or a folder written by
+            `write_scene`.
         up: axis that points up in a mesh file, "y" or "z"; by default y for glTF, which says so, and z for the others.
-        unit: unit of a mesh file's numbers: a name such as "millimetre", or metres as a number; by default the metre.
+        unit: unit of a mesh file's numbers: a name such as "millimetre", or metres as a number; by default what a DXF
+            states, 1/32 m for a map, and the metre for the others.
         doors: "open" (sight passes every door) or "closed" (doors occlude; glazing never does).
         glass: regular expression in place of the words for glass and windows in names; see `RoleRules`.
         doors_by: in place of the words for doors.
@@ -49,6 +51,9 @@ def read(
     if path.is_dir():
         return _read_folder(path, grid_m)
     suffix = path.suffix.lower()
+    if suffix == ".map":
+        how = "compile it with qbsp of ericw-tools, and read the .bsp"
+        raise InputError(f"{path}: expected a compiled map, found the source of one: {how}")
     if suffix not in IFC_SUFFIXES + MESH_SUFFIXES:
         raise InputError(f"{path}: expected {', '.join(IFC_SUFFIXES + MESH_SUFFIXES)} or a folder, found {suffix!r}")
     model = Model(source=str(path), sha256=_sha256(path), unit="metre", grid_m=grid_m)

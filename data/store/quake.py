@@ -224,14 +224,9 @@ def read_bsp(path: str | Path) -> CompiledSets:
         InputError: it is missing, truncated, of an unknown version, or holds no sets.
     """
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: expected a readable file, found {error.strerror}") from None
-    if data[:4] not in LAYOUTS:
-        raise InputError(f"{path}: expected a .bsp of version 29, 30, BSP2 or 2PSB, found {data[:4]!r}")
+    data = compiled_map(path)
     leaf_bytes, box_format = LAYOUTS[data[:4]]
-    leaves, visibility, models = (_lump(data, number, path) for number in (LEAVES, VISIBILITY, MODELS))
+    leaves, visibility, models = (lump(data, number, path) for number in (LEAVES, VISIBILITY, MODELS))
     if len(models) < MODEL_BYTES or len(leaves) < leaf_bytes:
         raise InputError(f"{path}: expected leaves and a model, found {len(leaves)} and {len(models)} bytes of them")
     count = struct.unpack_from("<i", models, MODEL_VISLEAFS)[0]
@@ -253,8 +248,27 @@ def read_bsp(path: str | Path) -> CompiledSets:
     return CompiledSets(boxes, potential, without)
 
 
-def _lump(data: bytes, number: int, path: Path) -> bytes:
-    """A part of the file, by its place in the directory."""
+def compiled_map(path: Path) -> bytes:
+    """All of a compiled map.
+
+    Raises:
+        InputError: it cannot be read, or is of an unknown version.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: expected a readable file, found {error.strerror}") from None
+    if data[:4] not in LAYOUTS:
+        raise InputError(f"{path}: expected a .bsp of version 29, 30, BSP2 or 2PSB, found {data[:4]!r}")
+    return data
+
+
+def lump(data: bytes, number: int, path: Path) -> bytes:
+    """A part of a compiled map, by its place in the directory.
+
+    Raises:
+        InputError: it reaches past the end of the file.
+    """
     if len(data) < 4 + 8 * LUMPS:
         raise InputError(f"{path}: expected a directory of {LUMPS} parts, found the end of the file")
     offset, size = struct.unpack_from("<2i", data, 4 + 8 * number)

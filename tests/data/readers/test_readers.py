@@ -142,7 +142,7 @@ def test_obj_groups_and_materials_are_objects(tmp_path):
         ("7|IfcSlabStandardCase|floor", "IfcSlabStandardCase", solid),
         ("8|IfcDoor|exit", "IfcDoor", clear),
         ("9|IfcFlowTerminal|sink", "IfcFlowTerminal", Role.DETAIL),
-        ("wall", "Mesh", clear),
+        ("wall #2", "Mesh", clear),
     ]
     closed = by_name(read(path, doors="closed"))
     assert closed["door 3"][1] is solid and closed["8|IfcDoor|exit"][1] is solid and closed["screen"][1] is clear
