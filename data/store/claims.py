@@ -14,7 +14,7 @@ import pyarrow as pa
 
 from ..errors import InputError
 from .scene_folder import one_line, read_manifest
-from .view_cells import ViewCells, read_rows
+from .view_cells import ViewCells, read_rows, require_columns_once
 
 TARGETS = {"object": "object_id", "cell": "reached_cell_id"}
 # What a column `verdict` may say, and whether the pair is in the potentially visible set.
@@ -131,6 +131,7 @@ def _from_table(
     table: pa.Table, view: ViewCells, object_names: Sequence[Sequence[str]], where: str
 ) -> tuple[str, np.ndarray]:
     """Which targets a table speaks of, and its pairs as bits."""
+    require_columns_once(table, where)
     found = [kind for kind, column in TARGETS.items() if column in table.column_names]
     if "cell_id" not in table.column_names or len(found) != 1:
         columns = ", ".join(table.column_names) or "no column"

@@ -1,5 +1,6 @@
 """View cells in a table: Parquet or CSV with min_x ... max_z, read, snapped to the grid, and written."""
 
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from .scene_folder import one_line, read_table
 
 # View cells may stand this far outside the model's box: in the street before a house.
 AROUND_M = 10.0
+# Beyond this, float64 does not tell a whole number from the next.
+WHOLE_FLOATS = 2**53
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,7 @@ def view_cells(
         origin: of the table's coordinates in the model's own place [m]; 0 by default.
         inwards: snap so that every eye in the cell is in the given box, instead of the other way round.
     """
+    require_columns_once(table, where)
     missing = [name for name in CELL_COLUMNS[1:] if name not in table.column_names]
     if missing:
         raise InputError(f"{where}: expected the column {missing[0]!r}, found {', '.join(table.column_names)}")
@@ -106,14 +110,37 @@ def _cell_ids(table: pa.Table, where: str) -> np.ndarray:
     if "cell_id" not in table.column_names:
         return np.arange(table.num_rows)
     column = table["cell_id"]
-    if pa.types.is_string(column.type) and not column.null_count:
+    if pa.types.is_dictionary(column.type):
+        column = column.cast(column.type.value_type)
+    if (pa.types.is_string(column.type) or pa.types.is_large_string(column.type)) and not column.null_count:
         ids = np.array(column.to_pylist(), object)
+    elif pa.types.is_integer(column.type) and not column.null_count:
+        # Not by way of float64, which has no odd numbers above 2**53.
+        ids = np.array(column.to_pylist(), object)
+        if max(ids, default=0) > np.iinfo(np.int64).max:
+            raise InputError(f"{where}: expected cell_id below 2**63, found {max(ids)}")
+        ids = ids.astype(np.int64)
     else:
-        ids = numbers(table, ("cell_id",), Path(where))[:, 0].astype(np.int64)
+        values = numbers(table, ("cell_id",), Path(where))[:, 0]
+        odd = (values != np.floor(values)) | (np.abs(values) > WHOLE_FLOATS)
+        if odd.any():
+            raise InputError(f"{where}: expected whole numbers or names as cell_id, found {values[odd][0]:.17g}")
+        ids = values.astype(np.int64)
     values, times = np.unique(ids, return_counts=True)
     if (times > 1).any():
         raise InputError(f"{where}: expected each cell_id once, found {values[times > 1][0]} {times.max()} times")
     return ids
+
+
+def require_columns_once(table: pa.Table, where: str) -> None:
+    """Raise where two columns share a name.
+
+    Raises:
+        InputError: they do.
+    """
+    twice = [name for name, times in Counter(table.column_names).items() if times > 1]
+    if twice:
+        raise InputError(f"{where}: expected each column once, found {twice[0]!r} more than once")
 
 
 def read_rows(path: str | Path) -> pa.Table:

@@ -97,7 +97,8 @@ def _follow_lines(
     boxes = np.tile(np.array([[0], [1]], np.int32), (count, 1, 3))
     claimed = read_claims(claims, ViewCells(as_graph(boxes), np.arange(count)), [], targets).cells
     settled, each = claimed.copy(), -(-rays // count)
-    seen = np.zeros_like(claimed)
+    # A leaf sees itself; lines begin where they leave it.
+    seen = np.eye(count, dtype=bool)
     joined = np.zeros(count, bool)
     joined[portals.leaves.ravel()] = True
     result = CheckResult(np.arange(count), np.flatnonzero(joined), [], {"cell": claimed}, {"cell": seen})

@@ -52,7 +52,8 @@ def check(
 
     Args:
         model: a scene, or a path: whatever `read` takes, a bake folder, a folder of cells.parquet and portals.parquet,
-            or a compiled map (.bsp with its .prt, or .prt); the last two are judged by their portals.
+            or a compiled map (.bsp with its .prt, or .prt); the last two are judged by their portals, unless view cells
+            beside a .bsp say that it is meant as a model.
         pvs: what is claimed to be potentially visible: a table or matrix as `data.store.claims.read_claims` takes it,
             or several in a list.
         cells: view cells: a table of boxes (a path, or anything that pyarrow makes a table of) in the model's own
@@ -73,7 +74,7 @@ def check(
     if rays < 1:
         raise InputError(f"rays: expected 1 or more, found {rays}")
     start = time.perf_counter()
-    if isinstance(model, str | Path) and Path(model).suffix.lower() in (".bsp", ".prt"):
+    if isinstance(model, str | Path) and _has_portals(Path(model), cells):
         from .map import check_map
 
         return check_map(Path(model), _sources(pvs), cells, rays=rays, seed=seed, targets=targets, progress=progress)
@@ -127,6 +128,13 @@ def assert_conservative(
         hidden = counted(len(result.wrong), "visible pair")
         raise AssertionError(f"not conservative: {hidden} claimed hidden\n{result.table()}")
     return result
+
+
+def _has_portals(model: Path, cells: object) -> bool:
+    """Whether a model is judged by a map's own portals: a .prt, or a .bsp without view cells of other kinds."""
+    suffix = model.suffix.lower()
+    ends_prt = isinstance(cells, str | Path) and Path(cells).suffix.lower() == ".prt"
+    return suffix == ".prt" or (suffix == ".bsp" and (cells is None or ends_prt))
 
 
 def _sources(pvs: object) -> Sequence[object]:
