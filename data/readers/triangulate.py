@@ -8,6 +8,8 @@ import numpy as np
 
 # A polygon whose corners lie further from their common plane than this share of its size is bent.
 BENT_SHARE = 1.0e-4
+# A corner is on an edge if it is no further off than this share of its length: float64 leaves no more.
+IN_LINE = 1.0e-12
 
 
 def polygon_triangles(vertices: Sequence, corners: Sequence[int]) -> list[tuple[int, int, int]]:
@@ -113,13 +115,15 @@ def _ears(points: np.ndarray) -> list[tuple[int, int, int]]:
     a, b, c = (flat[triangles[:, k]] for k in range(3))
     turned = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]) < 0
     triangles[turned] = triangles[turned][:, ::-1]
-    return _with_all_corners([tuple(map(int, one)) for one in triangles], ring)
+    return _with_all_corners([tuple(map(int, one)) for one in triangles], ring, flat)
 
 
-def _with_all_corners(triangles: list[tuple[int, int, int]], ring: list[int]) -> list[tuple[int, int, int]]:
+def _with_all_corners(
+    triangles: list[tuple[int, int, int]], ring: list[int], flat: np.ndarray
+) -> list[tuple[int, int, int]]:
     """The triangles, split at corners that lie on their edges: ear cutting leaves out what is in line.
 
-    Without them the rounding to the grid would open gaps to the neighbours that have those corners.
+    Without them the rounding to the grid would open gaps to the neighbours that have those corners. Spikes stay out.
     """
     used = {k for corners in triangles for k in corners}
     kept = [place for place, k in enumerate(ring) if k in used]
@@ -127,8 +131,8 @@ def _with_all_corners(triangles: list[tuple[int, int, int]], ring: list[int]) ->
         return triangles
     edges = {edge: place for place, (a, b, c) in enumerate(triangles) for edge in ((a, b), (b, c), (c, a))}
     for here, there in zip(kept, [*kept[1:], kept[0] + len(ring)], strict=True):
-        between = [ring[k % len(ring)] for k in range(here + 1, there)]
         a, b = ring[here], ring[there % len(ring)]
+        between = _between([ring[k % len(ring)] for k in range(here + 1, there)], a, b, flat)
         if not between or (a, b) not in edges:
             continue
         place = edges[a, b]
@@ -140,6 +144,19 @@ def _with_all_corners(triangles: list[tuple[int, int, int]], ring: list[int]) ->
             edges[before, after] = edges[after, third] = len(triangles)
             triangles.append((before, after, third))
     return triangles
+
+
+def _between(corners: list[int], a: int, b: int, flat: np.ndarray) -> list[int]:
+    """Those of the corners that lie on the way from a to b, each further on than the one before."""
+    way = flat[b] - flat[a]
+    square, reached, kept = float(way @ way), 0.0, []
+    for k in corners:
+        off = flat[k] - flat[a]
+        along, aside = float(off @ way), float(off[0] * way[1] - off[1] * way[0])
+        if reached < along < square and abs(aside) <= IN_LINE * square:
+            kept.append(k)
+            reached = along
+    return kept
 
 
 def _flattened(points: np.ndarray) -> np.ndarray:

@@ -1,0 +1,29 @@
+"""The second reader of a mesh file, chosen by its name."""
+
+from pathlib import Path
+
+from .gltf import found_in_gltf
+from .polygons import found_in_obj, found_in_ply, found_in_stl
+from .referee import Found
+
+SECOND_READERS = {
+    ".gltf": found_in_gltf,
+    ".glb": found_in_gltf,
+    ".obj": found_in_obj,
+    ".ply": found_in_ply,
+    ".stl": found_in_stl,
+}
+
+
+def found_in_mesh(path: Path, metres: float = 1.0, up: str | None = None) -> list[Found] | None:
+    """Objects of a mesh file as its second reader finds them; None for a kind that has none.
+
+    Args:
+        path: the file; one that the first reader refuses may raise anything here.
+        metres: length of the file's unit [m].
+        up: "y" or "z"; None for the format's habit.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SECOND_READERS:
+        return None
+    return SECOND_READERS[suffix](path, metres, up or ("y" if suffix in (".gltf", ".glb") else "z"))
