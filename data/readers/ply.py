@@ -192,7 +192,7 @@ def _read_text(path: Path, body: bytes, elements: list[_Element], model: Model) 
             part = words[at : at + element.rows * width]
             if len(part) < element.rows * width:
                 raise _early(path, element, len(body))
-            values = np.array(part, np.bytes_).astype(np.float64).reshape(element.rows, width)
+            values = _numbers(path, part).reshape(element.rows, width)
             element.scalars = {one.name: values[:, k] for k, one in enumerate(element.properties)}
             at += element.rows * width
             continue
@@ -204,20 +204,41 @@ def _read_text(path: Path, body: bytes, elements: list[_Element], model: Model) 
                 if one.count:
                     if at >= len(words):
                         raise _early(path, element, len(body))
-                    count, at = int(words[at]), at + 1
+                    count, at = _length(path, words[at]), at + 1
                 if count < 0 or at + count > len(words):
                     raise _early(path, element, len(body))
                 taken[one.name] += words[at : at + count]
                 counts[one.name].append(count)
                 at += count
         for one in element.properties:
-            values = np.array(taken[one.name], np.bytes_).astype(np.float64) if taken[one.name] else np.zeros(0)
+            values = _numbers(path, taken[one.name])
             if one.count:
                 element.lists[one.name] = (values, np.array(counts[one.name], np.int64))
             else:
                 element.scalars[one.name] = values
     if at < len(words):
         model.note(f"{len(words) - at} words", "after the last element: ignored")
+
+
+def _numbers(path: Path, words: list[bytes]) -> np.ndarray:
+    try:
+        return np.array(words, np.bytes_).astype(np.float64) if words else np.zeros(0)
+    except ValueError:
+        odd = next(word for word in words if not _is_number(word))
+        raise InputError(f"{path}: expected a number, found {odd.decode('latin-1')[:40]!r}") from None
+
+
+def _length(path: Path, word: bytes) -> int:
+    if not re.fullmatch(rb"-?\d{1,18}", word):
+        raise InputError(f"{path}: expected a number of corners, found {word.decode('latin-1')[:40]!r}")
+    return int(word)
+
+
+def _is_number(word: bytes) -> bool:
+    try:
+        return float(word) is not None
+    except ValueError:
+        return False
 
 
 def _corners(path: Path, element: _Element) -> tuple[np.ndarray, np.ndarray]:

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from builders import corridors
 from builders.four_rooms import write_graph
+from builders.places import SHARED
 from viewcell import InputError, bake
 from viewcell.data.store.graph_folder import read_graph
 from viewcell.data.store.quake import UNIT_STEPS, axial_graph, is_axial, read_bsp, read_prt, write_prt
 from viewcell.verify.rays.windings import WindingLines
 from viewcell.workbench.check.run import check
 
+CASES = SHARED / "cases" / "readers"
 # What the four rooms see: all but the first and the last see each other.
 SEEN = np.ones((4, 4), bool)
 SEEN[0, 3] = SEEN[3, 0] = False
@@ -210,3 +212,19 @@ def test_a_leaf_without_portals_sees_itself_alone(rooms, tmp_path):
     path.write_text(rooms[1].read_text().replace("PRT1\n4", "PRT1\n5"))
     result = check(path, np.pad(SEEN, (0, 1)))
     assert result.ok and result.seen["cell"][4].tolist() == [False] * 4 + [True]
+
+
+def test_a_leaf_of_an_oblique_map_sees_itself(rooms, tmp_path):
+    claims = np.eye(4, dtype=bool)
+    turned(rooms[1], tmp_path / "turned.prt")
+    result = check(tmp_path / "turned.prt", SEEN, rays=40_000)
+    assert np.array_equal(result.seen["cell"], SEEN)
+    assert result.claimed["cell"].sum() == result.seen["cell"].sum() == 14
+    alone = check(tmp_path / "turned.prt", claims, rays=4)
+    assert (np.diag(alone.seen["cell"])).all()
+
+
+@pytest.mark.skipif(not CASES.is_dir(), reason="no shared cases folder beside the checkout")
+def test_the_shared_oblique_map():
+    result = check(CASES / "turned.bsp")
+    assert result.seen["cell"].sum() == 14 and not result.wrong
