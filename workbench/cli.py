@@ -158,7 +158,11 @@ def _add_inspect(commands: argparse._SubParsersAction) -> None:
 
 def _add_bake(commands: argparse._SubParsersAction) -> None:
     bake = _command(commands, "bake", "bake", "Compute what can be seen from each cell of a model.")
-    bake.add_argument("model", metavar="MODEL", help="IFC, glTF, OBJ, PLY, STL, a scene folder, or cells and portals")
+    bake.add_argument(
+        "model",
+        metavar="MODEL",
+        help="IFC, glTF, OBJ, PLY, STL, DXF, a Quake .bsp, a scene folder, or cells and portals",
+    )
     bake.add_argument("--out", metavar="BAKE", help="folder to write; MODEL's name with .bake by default")
     _add_numbers(bake)
     bake.add_argument(
@@ -254,7 +258,7 @@ def _add_check(commands: argparse._SubParsersAction) -> None:
         "model",
         metavar="MODEL",
         nargs="?",
-        help="IFC, glTF, OBJ, PLY, STL, a scene or bake folder, cells and portals, or a compiled map (.bsp, .prt); "
+        help="IFC, glTF, OBJ, PLY, STL, DXF, a scene or bake folder, cells and portals, a compiled map (.bsp, .prt); "
         "with --replay, that of the check if left out",
     )
     check.add_argument(

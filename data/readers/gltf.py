@@ -163,20 +163,18 @@ class _Shown:
         key = (node["mesh"], weights)
         if key not in self._known:
             self._known[key] = list(self._by_material(mesh, name, weights))
+        elif not self._known[key]:
+            self.model.skip(name, "no triangles")
         parts = self._known[key]
+        judged = " ".join(dict.fromkeys((name, str(mesh.get("name") or name))))
         places = list(self._instances(node, name, to_file))
         for number, place in enumerate(places, start=1):
             each = name if INSTANCING not in extensions(node) else f"{name} #{number}"
             for material, points, faces, colours in parts:
-                stated = self._material_name(material)
-                own = (
-                    each
-                    if len(parts) == 1
-                    else f"{each}: {stated or ('no material' if material is None else f'material {material}')}"
-                )
-                clear = self._clear(material)
-                hint = str(mesh.get("name") or "")
-                yield Piece(own, points, faces, stated, clear, "" if hint == name else hint, place, colours)
+                stated, clear = self._material_name(material), self._clear(material)
+                label = stated or ("no material" if material is None else f"material {material}")
+                own = each if len(parts) == 1 else f"{each}: {label}"
+                yield Piece(own, points, faces, stated, clear, judged, place, colours)
 
     def _instances(self, node: dict, name: str, to_file: np.ndarray) -> Iterator[np.ndarray]:
         """Where a node stands: once, or where the instances of an extension say."""

@@ -93,7 +93,7 @@ def read_pieces(path: Path, model: Model) -> MeshFile:
 
 
 def _part(piece: Piece, name: str, to_model: np.ndarray, roles: RoleRules) -> Part:
-    taken = roles.of_mesh(f"{piece.name} {piece.hint}".strip(), piece.material, piece.clear)
+    taken = roles.of_mesh(piece.judged or piece.name, piece.material, piece.clear)
     points, faces = used(piece.vertices, piece.faces)
     transform = to_model @ piece.to_file
     key = shape_key(points, faces, piece.colours)

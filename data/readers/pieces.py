@@ -20,7 +20,7 @@ class Piece:
         faces: shape (m, 3), int64.
         material: its name, for what it says of glass; empty where there is none.
         clear: by what its material lets sight pass, in words; empty if it does not say so.
-        hint: further names, to judge doors and windows by.
+        judged: names to tell doors and windows by; the name itself if empty.
         to_file: the piece's frame to the file's, shape (4, 4), float64.
         colours: as in `Mesh`.
     """
@@ -30,7 +30,7 @@ class Piece:
     faces: np.ndarray
     material: str = ""
     clear: str = ""
-    hint: str = ""
+    judged: str = ""
     to_file: np.ndarray = field(default_factory=lambda: np.eye(4))
     colours: np.ndarray | None = None
 

@@ -76,7 +76,7 @@ def read_map(path: Path, model: Model) -> MeshFile:
             own = f"{name}: {texture}" if name else texture
             to_file = np.eye(4)
             to_file[:3, 3] = origin
-            pieces.append(Piece(own, vertices, triangles, texture, clear, to_file=to_file))
+            pieces.append(Piece(own, vertices, triangles, texture, clear, judged=kind, to_file=to_file))
     model.notes += bent_note(bent, cut)
     return MeshFile(pieces, UNIT_STEPS * GRID_M)
 

@@ -68,7 +68,6 @@ def test_versions_and_extensions(tmp_path):
 BROKEN = {
     "count": lambda out: out["accessors"][0].update(count=10**9),
     "negative count": lambda out: out["accessors"][0].update(count=-1),
-    "zeros without end": lambda out: out["accessors"][0].pop("bufferView") and out["accessors"][0].update(count=10**9),
     "no view": lambda out: out["accessors"][0].update(bufferView=-1),
     "long view": lambda out: out["bufferViews"][0].update(byteLength=10**9),
     "stride": lambda out: out["bufferViews"][0].update(byteStride=4),
@@ -92,6 +91,30 @@ def test_contradictions_are_one_line(tmp_path, case):
     out, data = gltf_parts(ONE)
     BROKEN[case](out)
     refused(written(tmp_path / "a.glb", out, data))
+
+
+def test_counts_are_held_against_the_size_of_the_file(tmp_path):
+    """Zeros take no room in it, and a length in the header none either."""
+    out, data = gltf_parts(TWO)
+    del out["accessors"][0]["bufferView"]
+    out["accessors"][0]["count"] = 10**7
+    assert "bytes may hold" in refused(written(tmp_path / "a.glb", out, data))
+    content = glb(*gltf_parts())
+    (tmp_path / "a.glb").write_bytes(content[:8] + (len(content) + 5).to_bytes(4, "little") + content[12:])
+    assert "found the end of the file" in refused(tmp_path / "a.glb")
+
+
+def test_names_of_materials_are_not_those_of_objects(tmp_path):
+    """A wall with a part in the paint of windows is no window."""
+    out, data = gltf_parts(TWO)
+    out["materials"] = [{"name": "Window frame white"}, {"name": "brick"}]
+    primitive = out["meshes"][0]["primitives"][0]
+    out["meshes"][0]["primitives"] = [primitive | {"material": 0}, primitive | {"material": 1}]
+    scene = read(written(tmp_path / "a.glb", out, data))
+    assert [placed.role for placed in scene.objects] == [Role.OCCLUDER] * 3
+    out["meshes"][0]["name"] = "Window 3"
+    scene = read(written(tmp_path / "a.glb", out, data))
+    assert [placed.role for placed in scene.objects] == [Role.TRANSPARENT, Role.TRANSPARENT, Role.OCCLUDER]
 
 
 def test_strides_offsets_and_interleaved_views(tmp_path):
@@ -201,13 +224,14 @@ def test_what_has_no_triangles_is_skipped(tmp_path):
     for name, change in extra.items():
         out["nodes"].append({"mesh": len(out["meshes"]), "name": name})
         out["meshes"].append({"primitives": [out["meshes"][0]["primitives"][0] | change]})
+    out["nodes"].append({"mesh": len(out["meshes"]) - 1, "name": "nothing again"})
     out["nodes"] += [{"mesh": 0, "skin": 0, "name": "dancer"}, {"mesh": 1, "name": "ghost"}]
     out["nodes"][-1]["extensions"] = {"KHR_node_visibility": {"visible": False}}
     out["meshes"].append({"primitives": [], "name": "spare"})
     out["scenes"] = [{"nodes": list(range(len(out["nodes"])))}]
     scene = read(written(tmp_path / "a.glb", out, data))
     assert [placed.name for placed in scene.objects] == ["wall", "post"]
-    assert {one["what"] for one in scene.skipped} == {*extra, "dancer", "ghost", "spare"}
+    assert {one["what"] for one in scene.skipped} == {*extra, "nothing again", "dancer", "ghost", "spare"}
 
 
 def test_strips_fans_and_left_over_corners(tmp_path):
@@ -222,6 +246,19 @@ def test_strips_fans_and_left_over_corners(tmp_path):
     # Of 8 triangles of the strip 4 turn the corner; the fan has 2, the list 1.
     assert scene.triangle_counts[0] == 4 + 2 + 1
     assert [note["why"] for note in scene.notes] == ["2 corners beyond the last whole triangle: ignored"]
+
+
+@pytest.mark.parametrize(("mode", "corners"), [(4, [0, 1, 3, 0, 3, 2]), (5, [0, 1, 2, 3]), (6, [0, 1, 3, 2])])
+def test_a_quad_in_every_mode_turns_one_way(tmp_path, mode, corners):
+    out, data = gltf_parts(ONE)
+    index = add_accessor(out, data, np.array(corners, np.uint32).reshape(-1, 1), "SCALAR")
+    out["meshes"][0]["primitives"] = [{"attributes": {"POSITION": 0}, "indices": index, "mode": mode}]
+    corners = read(written(tmp_path / "a.glb", out, data)).triangles()[0] * 2.0**-10
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert normals.tolist() == [[-3, 0, 0]] * 2
+    # A strip has the edge from 1 to 2 twice, the others that from 0 to 3.
+    shared = {tuple(point) for point in corners[0].tolist()} & {tuple(point) for point in corners[1].tolist()}
+    assert shared == ({(0, 0, 1), (0, 1, -2)} if mode == 5 else {(0, 0, -2), (0, 1, 1)})
 
 
 def test_morphs_move_what_they_weigh(tmp_path):
