@@ -46,9 +46,18 @@ def read_dxf(path: Path, model: Model) -> MeshFile:
         InputError: the file ends early or is not understood.
     """
     drawing = _open(path)
+    try:
+        return _taken(path, drawing, model)
+    except (InputError, MemoryError):
+        raise
+    except Exception as error:  # ezdxf raises whatever it trips over
+        raise _unreadable(path, error) from None
+
+
+def _taken(path: Path, drawing, model: Model) -> MeshFile:
     reader = _Reader(path, drawing, model)
     loose: dict[str, _Layer] = {}
-    pieces = []
+    pieces, empty = [], Counter()
     for entity in drawing.modelspace():
         if entity.dxftype() != "INSERT":
             reader.take(entity, "", loose)
@@ -57,12 +66,15 @@ def read_dxf(path: Path, model: Model) -> MeshFile:
             held: dict[str, _Layer] = {}
             reader.expand(copy, "", held, 0)
             block = str(copy.dxf.name)
+            empty[block] += not held
             pieces += [reader.piece(block if len(held) == 1 else f"{block}: {one.layer}", one) for one in held.values()]
     pieces = [reader.piece(one.layer, one) for one in loose.values()] + pieces
     model.notes += bent_note(reader.bent, reader.polygons)
     for kind, count in sorted(reader.left.items()):
         why = "an ACIS solid, which is not read" if kind in ACIS else "no triangles"
         model.skip(f"{count} of {kind}", why)
+    for block, count in sorted((+empty).items()):
+        model.skip(f"{count} of block {block}", "no faces that are shown")
     for layer, count in sorted(reader.hidden.items()):
         model.skip(f"{count} entities of layer {layer}", "the layer is off or frozen")
     stated = int(drawing.header.get("$INSUNITS", 0))
@@ -88,8 +100,12 @@ def _open(path: Path):
     try:
         return ezdxf.readfile(path)
     except Exception as error:  # ezdxf raises whatever its parsing trips over
-        found = " ".join(str(error).split())[:120] or type(error).__name__
-        raise InputError(f"{path}: expected a readable DXF file, found {found}") from None
+        raise _unreadable(path, error) from None
+
+
+def _unreadable(path: Path, error: Exception) -> InputError:
+    found = " ".join(str(error).encode(errors="replace").decode().split())[:120] or type(error).__name__
+    return InputError(f"{path}: expected a readable DXF file, found {found}")
 
 
 class _Reader:
@@ -113,6 +129,8 @@ class _Reader:
         """Take what a block holds, placed; entities of layer 0 are on the layer of the INSERT."""
         if depth > DEPTH:
             raise InputError(f"{self.path}: expected blocks within blocks at most {DEPTH} deep, found deeper")
+        if insert.block() is None:
+            return
         own = _layer_of(insert, layer)
         for entity in insert.virtual_entities():
             if entity.dxftype() == "INSERT":

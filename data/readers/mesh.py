@@ -32,6 +32,8 @@ READERS: dict[str, Callable[[Path, Model], MeshFile]] = {
     ".dxf": read_dxf,
     ".bsp": read_map,
 }
+# Names of several objects that are noted one by one.
+NAMES_NOTED = 20
 # What a reader may trip over in a file that is not what it seems.
 TRIPS = (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError, RecursionError, struct.error)
 
@@ -57,9 +59,11 @@ def read_mesh(path: Path, model: Model, *, up: str | None, unit: str | float | N
         lost = f"; {len(model.skipped)} skipped, first: {model.skipped[0]['why']}" if model.skipped else ""
         raise InputError(f"{path}: expected triangles, found none{lost}")
     names = [piece.name for piece in found.pieces]
-    shared = {name: count for name, count in Counter(names).items() if count > 1}
-    for name, count in shared.items():
+    shared = [(name, count) for name, count in Counter(names).items() if count > 1]
+    for name, count in shared[:NAMES_NOTED]:
         model.note(name, f"a name of {count} objects: told apart as {name!r}, {name + ' #2'!r} and so on")
+    if more := len(shared[NAMES_NOTED:]):
+        model.note(f"{more} more names", "of several objects each: told apart likewise")
     for piece, name in zip(found.pieces, told_apart(names), strict=True):
         part = _part(piece, name, to_model, roles)
         if roles.leaves_out(part.name, part.kind):

@@ -104,6 +104,9 @@ def test_what_is_no_face_is_listed(tmp_path):
         space.add_line((0, 0), (1, 1))
         space.add_line((0, 0), (2, 1))
         space.add_3dsolid().sat = ["700 0 1 0", "@8 nobody 1 @ 0", "End-of-ACIS-data"]
+        drawing.blocks.new("plan").add_line((0, 0), (1, 1))
+        space.add_blockref("plan", (0, 0))
+        space.add_blockref("gone", (0, 0))
         drawing.layers.add("hidden").off()
         square(drawing, layer="hidden")
 
@@ -111,7 +114,9 @@ def test_what_is_no_face_is_listed(tmp_path):
     assert [placed.name for placed in scene.objects] == ["wall"]
     assert {one["what"]: one["why"] for one in scene.skipped} == {
         "1 of 3DSOLID": "an ACIS solid, which is not read",
-        "2 of LINE": "no triangles",
+        "3 of LINE": "no triangles",
+        "1 of block gone": "no faces that are shown",
+        "1 of block plan": "no faces that are shown",
         "1 entities of layer hidden": "the layer is off or frozen",
     }
 

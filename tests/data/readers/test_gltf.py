@@ -298,6 +298,13 @@ def test_draco_is_decoded(tmp_path):
         assert np.abs(np.subtract(box_of(scene, name), box)).max() < 0.002
 
 
+def test_what_is_packed_beside_its_fallback_is_read(tmp_path):
+    out, data = gltf_parts(ONE)
+    out["extensionsUsed"] = ["EXT_meshopt_compression"]
+    out["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": {"buffer": 1, "byteLength": 4}}
+    assert box_of(read(written(tmp_path / "a.glb", out, data)), "wall") == [[0, 0, 0], [4, 1, 3]]
+
+
 def test_animated_nodes_are_noted(tmp_path):
     out, data = gltf_parts(ONE)
     out["animations"] = [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}], "samplers": []}]

@@ -207,6 +207,20 @@ def test_a_path_decides_nothing_but_the_reader(tmp_path):
     assert boxes(read(tmp_path / "a.GLTF")) == boxes(read(tmp_path / "b.GLB"))
 
 
+def test_many_names_of_several_objects_are_noted_together(tmp_path):
+    body = "".join(f"o part {k}\nusemtl {m}\nf 1 2 3\n" for k in range(30) for m in "ab")
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 4 0 0\nv 0 4 0\n" + body)
+    scene = read(tmp_path / "a.obj")
+    assert len({placed.name for placed in scene.objects}) == 60
+    assert [note["what"] for note in scene.notes][19:] == ["part 19", "10 more names"]
+
+
+def test_names_that_look_told_apart_stay_apart(tmp_path):
+    body = "".join(f"o {name}\nusemtl {m}\nf 1 2 3\n" for name, m in (("a", 1), ("a", 2), ("a #2", 1), ("a", 3)))
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 4 0 0\nv 0 4 0\n" + body)
+    assert [placed.name for placed in read(tmp_path / "a.obj").objects] == ["a", "a #3", "a #2", "a #4"]
+
+
 def test_parts_are_left_out_as_asked(tmp_path):
     (tmp_path / "a.obj").write_bytes(obj())
     scene = read(tmp_path / "a.obj", leave_out="^BOX")
