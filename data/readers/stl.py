@@ -20,8 +20,7 @@ VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 def read_stl(path: Path, model: Model) -> MeshFile:
     """The solids of a file, named as they are; one without a name is named like the file.
 
-    A binary file is told by its count of triangles, as some that are binary begin with "solid". What follows the last
-    triangle is noted.
+    A binary file may begin with "solid" too. What follows the last triangle is noted.
 
     Raises:
         InputError: the file ends early, or is neither.
@@ -48,14 +47,10 @@ def read_stl(path: Path, model: Model) -> MeshFile:
 
 
 def _is_text(data: bytes) -> bool:
-    """Whether the file is text: it begins with "solid", has facets, and is no binary file of just its size."""
+    """Whether the file is text: it begins with "solid" and has facets."""
     if not re.match(rb"(?:\xef\xbb\xbf)?\s*solid\b", data[:200], re.IGNORECASE):
         return False
-    if len(data) >= HEADER_BYTES:
-        count = struct.unpack_from("<I", data, HEADER_BYTES - COUNT_BYTES)[0]
-        if len(data) == HEADER_BYTES + count * TRIANGLE.itemsize:
-            return False
-    # In text there is no byte 0; the header of a binary file, blanks for instance, may look like text.
+    # Headers of binary files may look like text, but a count below 2**24 has a byte 0, and text has none.
     return b"\0" not in data[:1024] and re.search(rb"\b(facet|endsolid)\b", data[:100_000], re.IGNORECASE) is not None
 
 

@@ -112,9 +112,6 @@ def _ears(points: np.ndarray) -> list[tuple[int, int, int]]:
     if not len(found):
         return fan
     triangles = np.array(ring)[found.reshape(-1, 3).astype(np.int64)]
-    a, b, c = (flat[triangles[:, k]] for k in range(3))
-    turned = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]) < 0
-    triangles[turned] = triangles[turned][:, ::-1]
     return _with_all_corners([tuple(map(int, one)) for one in triangles], ring, flat)
 
 

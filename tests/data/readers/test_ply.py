@@ -57,7 +57,10 @@ def test_strips_in_binary(tmp_path):
     body = POINTS.astype(">f4").tobytes() + struct.pack(">11i", len(strip), *strip)
     (tmp_path / "a.ply").write_bytes(head.encode() + body)
     scene = read(tmp_path / "a.ply")
-    assert len(scene.triangles()[0]) == 4
+    corners = scene.triangles()[0] * 2.0**-10
+    assert len(corners) == 4
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert normals[:2].tolist() == [[-3, 0, 0]] * 2 and (normals[2:, 1] == normals[2, 1]).all()
     assert scene.skipped == [{"what": "1 strips", "why": "fewer than 3 corners"}]
 
 
@@ -84,7 +87,15 @@ def test_lies_are_one_line(tmp_path, case):
     element = (*element, "element face 1")[0]
     text = f"{head.format(form)}{element}\nproperty list uchar int vertex_indices\nend_header\n{ROWS}{faces}"
     (tmp_path / "a.ply").write_text(text)
-    refused(tmp_path / "a.ply")
+    said = refused(tmp_path / "a.ply")
+    assert "readable" not in said
+    assert ("that fit the file" in said) is ("without end" in case)
+
+
+def test_a_negative_length_in_binary_is_one_line(tmp_path):
+    head = HEAD.format("binary_little_endian") + "element face 1\nproperty list int int vertex_indices\nend_header\n"
+    (tmp_path / "a.ply").write_bytes(head.encode() + POINTS.astype("<f4").tobytes() + struct.pack("<4i", -3, 0, 1, 2))
+    assert "expected 1 rows of element 'face'" in refused(tmp_path / "a.ply")
 
 
 @pytest.mark.parametrize("order", ["ascii", "<", ">"])

@@ -56,6 +56,7 @@ BROKEN = {
     "cut": lambda text: text[:5000],
     "no end": lambda text: text[: text.rindex(b"endsolid")],
     "no loop": lambda text: text.replace(LINE, b"", 1),
+    "facet without a loop": lambda text: text.replace(b"endsolid", b"facet normal 0 0 0\nendfacet\nendsolid", 1),
     "four corners": lambda text: text.replace(LINE, b"      vertex 0 0 0\n" + LINE, 1),
     "no number": lambda text: text.replace(b"vertex 0 0", b"vertex 0 x", 1),
     "solid in solid": lambda text: text.replace(b"endsolid floor\n", b"", 1),

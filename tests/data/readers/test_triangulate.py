@@ -35,6 +35,17 @@ def test_combs_keep_their_area_and_all_corners(teeth, start, tilt, clockwise):
     assert (normals @ newell(points) > -1e-9).all()
 
 
+def test_corners_in_line_are_kept():
+    side = np.arange(4.0)
+    flat = np.concatenate([np.column_stack(pair) for pair in (
+        (side, 0 * side), (0 * side + 4, side), (4 - side, 0 * side + 4), (0 * side, 4 - side))])  # fmt: skip
+    for start in range(len(flat)):
+        points = np.column_stack([np.roll(flat, start, axis=0), np.zeros(len(flat))])
+        faces, _ = cut(points)
+        assert set(faces.ravel().tolist()) == set(range(16))
+        assert area(points, faces) == pytest.approx(16)
+
+
 def test_spikes_and_repeated_corners_add_nothing():
     points = np.array([[0, 0, 0], [4, 0, 0], [4, 0, 0], [4, 3, 0], [4, 7, 0], [4, 3, 0], [0, 3, 0], [0, 0, 0]], float)
     assert area(points, cut(points)[0]) == pytest.approx(12)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders.model_files import FILES
+from builders.model_files import FILES, glb, gltf_parts
 from builders.places import SHARED
 from viewcell.data.errors import InputError
 from viewcell.data.readers import read
@@ -42,6 +42,15 @@ def test_both_readers_agree_on_shared_cases(path):
 def test_both_readers_agree_on_shared_scenes(name):
     (path,) = SCENES.glob(f"*/{name}")
     assert compared(path, UPS.get(name)) == []
+
+
+@pytest.mark.parametrize("mode", [4, 5, 6])
+def test_both_readers_agree_on_strips_and_fans(tmp_path, mode):
+    out, data = gltf_parts()
+    for mesh in out["meshes"]:
+        mesh["primitives"][0]["mode"] = mode
+    (tmp_path / "a.glb").write_bytes(glb(out, data))
+    assert compared(tmp_path / "a.glb") == []
 
 
 def test_units_and_axes_are_the_first_readers(tmp_path):
