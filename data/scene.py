@@ -17,6 +17,8 @@ from .ragged import starts_of
 GRID_M = 2.0**-10
 # Coordinate differences stay below 2**25, so the products that the stabbing kernel forms are exact in float64.
 GRID_LIMIT = 2**24
+# With this begins `what` in `Scene.skipped` for a room that the model names but gives no body.
+LOST_ROOM = "room "
 # Vertices or triangles that are placed at a time.
 FLAT_CHUNK = 200_000
 
@@ -125,6 +127,11 @@ class Scene:
     unit: str = "metre"
     skipped: list[dict[str, str]] = field(default_factory=list)
     notes: list[dict[str, str]] = field(default_factory=list)
+
+    @property
+    def lost_rooms(self) -> list[str]:
+        """Rooms that the model names but gives no body, as listed in `skipped`."""
+        return [lost["what"] for lost in self.skipped if lost["what"].startswith(LOST_ROOM)]
 
     def world_vertices(self, object_id: int, lod: int = 0) -> np.ndarray:
         """Snapped world vertices of one object [grid steps], shape (n, 3), int32.

@@ -8,7 +8,7 @@ from ..scene import GRID_M, Scene, source_path
 from .assemble import Model
 from .roles import RoleRules
 
-IFC_SUFFIXES = (".ifc",)
+IFC_SUFFIXES = (".ifc", ".ifczip")
 MESH_SUFFIXES = (".bsp", ".dxf", ".glb", ".gltf", ".obj", ".ply", ".stl")
 UP_CHOICES = (None, "y", "z")
 
@@ -27,7 +27,7 @@ def read(
     """The model in a file or scene folder, as a scene ready to bake.
 
     Args:
-        path: .ifc, .glb, .gltf, .obj, .ply, .stl, .dxf, .bsp (a compiled Quake map), or a folder written by
+        path: .ifc, .ifczip, .glb, .gltf, .obj, .ply, .stl, .dxf, .bsp (a compiled Quake map), or a folder written by
             `write_scene`.
         up: axis that points up in a mesh file, "y" or "z"; by default y for glTF, which says so, and z for the others.
         unit: unit of a mesh file's numbers: a name such as "millimetre", or metres as a number; by default what a DXF

@@ -1,71 +1,134 @@
-"""IFC files, through ifcopenshell.
+"""IFC files, through ifcopenshell; an .ifczip is a zip archive with one of them.
 
-Products are sorted by GlobalId, because the geometry threads deliver them in any order. Products that share one
-geometry share one definition.
+Products are sorted by GlobalId, because the geometry threads deliver them in any order, and told apart by their numbers
+in the file, because a GlobalId may stand there twice. Products that share one geometry share one definition.
 """
 
-import os
 import re
 import tempfile
+import zipfile
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
-from ..scene import Scene, Space
+from ..scene import LOST_ROOM, Scene, Space
 from .assemble import Model, Part, assemble
-from .roles import RoleRules
+from .ifc_materials import associations, glass_material, type_of
+from .ifc_shapes import Shape, keep_bodies, shape_alone, shapes_of
+from .roles import RoleRules, Taken
+from .step import check_step
+from .turned import note_turned
 
 # The geometry of these is no surface that anything could stand before.
 NOT_OBJECTS = ("IfcOpeningElement", "IfcAnnotation", "IfcGrid", "IfcVirtualElement", "IfcSpatialElement")
 NOT_OBJECTS_2X3 = ("IfcFeatureElement", "IfcSpatialStructureElement", "IfcPort", "IfcStructuralItem")
+# Shown as lines, or cut from walls: nothing that a list of what is missing should hold.
+UNSEEN = ("IfcOpeningElement", "IfcAnnotation", "IfcGrid")
 OLD_SCHEMA = re.compile(rb"(FILE_SCHEMA\s*\(\s*\(\s*')(IFC2X_FINAL|IFC2X2_FINAL|IFC2X2|IFC2X)(')", re.IGNORECASE)
 STAR = re.compile(r"[(,]\*[,)]")
-TRANSPARENCY = 0.05
+# Far beyond what text of this kind shrinks to.
+MAX_ZIP_RATIO, MAX_ZIP_BYTES = 200, 8 * 2**30
+NAMES_SHOWN = 5
 
 
 def read_ifc(path: Path, model: Model, roles: RoleRules) -> Scene:
     """Scene of an IFC2x, IFC2x3, IFC4 or IFC4x3 file.
 
     Args:
-        path: the file; it is never written to.
+        path: .ifc or .ifczip; it is never written to.
         model: source, sha256 and grid step; filled in here.
         roles: what is glass, a door, or left out.
 
     Raises:
-        InputError: the file is no IFC file, or holds nothing opaque that can be read.
+        InputError: the file is no IFC file, is damaged, or holds nothing opaque that can be read.
     """
     ifc = _open(path)
-    model.unit = _unit(ifc)
-    _mend_stars(ifc, model)
-    shapes = {shape.guid: shape for shape in _shapes(ifc, exclude=("IfcOpeningElement", "IfcAnnotation", "IfcGrid"))}
-    products = {product.GlobalId: product for product in ifc.by_type("IfcProduct")}
-    for guid in sorted(shapes):
-        _take(products[guid], shapes[guid], model, roles)
-    _note_failures(ifc, shapes, model)
-    _find_openings(ifc, shapes, model)
+    try:
+        _take_all(ifc, model, roles)
+    except (InputError, MemoryError):
+        raise
+    except Exception as error:  # an attribute that is none of its kind shows only when it is asked for
+        found = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{path}: expected a sound IFC file, found {found[:200]}") from None
+    note_turned(model)
     return assemble(model)
 
 
 def _open(path: Path) -> object:
     import ifcopenshell
 
+    content = _content(path)
+    check_step(path, content)
+    # Old headers are refused by name only; entities of IFC2x are read as those of IFC2x3.
+    mended = OLD_SCHEMA.sub(rb"\1IFC2X3\3", content[:65536], count=1) + content[65536:]
     try:
-        content = path.read_bytes()
-        # Old headers are refused by name only; entities of IFC2x are read as those of IFC2x3.
-        mended = OLD_SCHEMA.sub(rb"\1IFC2X3\3", content[:65536], count=1) + content[65536:]
-        if not content.lstrip()[:13].upper().startswith(b"ISO-10303-21"):
-            raise InputError(f"{path}: expected an IFC file (ISO-10303-21), found {content[:24]!r}")
-        if mended == content:
-            return ifcopenshell.open(str(path))
-        with tempfile.TemporaryDirectory() as folder:
-            copy = Path(folder) / "copy.ifc"
-            copy.write_bytes(mended)
-            return ifcopenshell.open(str(copy))
+        if mended == content and path.suffix.lower() == ".ifc":
+            ifc = ifcopenshell.open(str(path))
+        else:
+            with tempfile.TemporaryDirectory() as folder:
+                copy = Path(folder) / "copy.ifc"
+                copy.write_bytes(mended)
+                ifc = ifcopenshell.open(str(copy))
+        if not ifc.by_type("IfcProject"):
+            raise InputError(f"{path}: expected an IfcProject, which says the unit of length, found none")
+        return ifc
     except InputError:
         raise
     except Exception as error:  # the parser raises RuntimeError, OSError and its own types
         raise InputError(f"{path}: expected a readable IFC file, found {' '.join(str(error).split())}") from None
+
+
+def _content(path: Path) -> bytes:
+    """The text of the IFC file.
+
+    Raises:
+        InputError: it cannot be read, or the archive does not hold one IFC file of a credible size.
+    """
+    try:
+        if path.suffix.lower() != ".ifczip":
+            return path.read_bytes()
+        with zipfile.ZipFile(path) as archive:
+            inside = [entry for entry in archive.infolist() if entry.filename.lower().endswith(".ifc")]
+            if len(inside) != 1:
+                raise InputError(f"{path}: expected one .ifc file in the archive, found {len(inside)}")
+            size, packed = inside[0].file_size, max(1, inside[0].compress_size)
+            if size > MAX_ZIP_BYTES or size > MAX_ZIP_RATIO * packed + 2**20:
+                raise InputError(
+                    f"{path}: expected a file that shrank at most {MAX_ZIP_RATIO} times, found {size} bytes"
+                )
+            return archive.read(inside[0])
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(f"{path}: expected a readable file, found {error.strerror}") from None
+    except Exception as error:  # zipfile raises its own, zlib's, and what encryption and unknown methods bring
+        raise InputError(f"{path}: expected a zip archive with an IFC file, found {error}") from None
+
+
+def _take_all(ifc: object, model: Model, roles: RoleRules) -> None:
+    model.unit = _unit(ifc)
+    _mend_stars(ifc, model)
+    products = {product.id(): product for product in ifc.by_type("IfcProduct")}
+    boxes = _room_boxes(products)
+    lost = keep_bodies(products.values())
+    shapes = shapes_of(ifc, exclude=[product for name in UNSEEN for product in _by_type(ifc, name)])
+    # One whose shape the iterator passed over, perhaps for the fault of another.
+    for number, product in products.items():
+        if product.Representation is not None and number not in shapes and not _is_any(product, UNSEEN):
+            alone = shape_alone(product)
+            if alone is not None:
+                shapes[number] = alone
+    order = sorted(shapes, key=lambda number: (products[number].GlobalId or "", number))
+    metres = _metres(ifc)
+    for number in order:
+        _take(products[number], shapes[number], model, roles, metres)
+    _note_rooms(products, shapes, boxes, lost, model)
+    _note_failures(products, shapes, lost, model)
+    _note_others(products, shapes, model)
+    _note_repeats([products[number] for number in order], model)
+    _find_openings(ifc, shapes, model)
 
 
 def _mend_stars(ifc: object, model: Model) -> None:
@@ -92,22 +155,11 @@ def _unit(ifc: object) -> str:
     return ((getattr(unit, "Prefix", None) or "") + (unit.Name or "metre")).lower()
 
 
-def _shapes(ifc: object, **selection: object) -> list:
-    """Triangulated shapes in their own frames, metres; in any order."""
-    import ifcopenshell.geom
+def _metres(ifc: object) -> float:
+    """Length of the file's unit [m]."""
+    import ifcopenshell.util.unit
 
-    settings = ifcopenshell.geom.settings()
-    settings.set("weld-vertices", True)
-    chosen = {key: [entity for name in names for entity in _by_type(ifc, name)] for key, names in selection.items()}
-    if not all(chosen.values()) and "include" in chosen:
-        return []
-    iterator = ifcopenshell.geom.iterator(settings, ifc, os.cpu_count() or 1, **chosen)
-    shapes = []
-    more = iterator.initialize()
-    while more:
-        shapes.append(iterator.get())
-        more = iterator.next()
-    return shapes
+    return float(ifcopenshell.util.unit.calculate_unit_scale(ifc))
 
 
 def _by_type(ifc: object, name: str) -> list:
@@ -117,67 +169,145 @@ def _by_type(ifc: object, name: str) -> list:
         return []
 
 
-def _take(product: object, shape: object, model: Model, roles: RoleRules) -> None:
+def _is_any(product: object, kinds: tuple[str, ...]) -> bool:
+    return any(map(product.is_a, kinds))
+
+
+def _is_object(product: object) -> bool:
+    return product.is_a("IfcSite") or not _is_any(product, NOT_OBJECTS + NOT_OBJECTS_2X3)
+
+
+def _name(product: object) -> str:
+    # Names of rooms repeat from floor to floor and may be missing: the GlobalId is what a row can be found by.
+    return product.Name or product.GlobalId or f"#{product.id()}"
+
+
+def _take(product: object, shape: Shape, model: Model, roles: RoleRules, metres: float) -> None:
     """Add one product to the model as a space or an object, or to neither."""
-    vertices, faces = _buffers(shape)
-    transform = np.array(shape.transformation.matrix, np.float64).reshape(4, 4).T
+    name, kind, guid = _name(product), product.is_a(), product.GlobalId or ""
     if product.is_a("IfcSpace"):
-        if len(faces):
-            # Names of rooms repeat from floor to floor and may be missing: the GlobalId is what a row can be found by.
-            name = product.Name or product.GlobalId
-            model.spaces.append(Space(name, vertices @ transform[:3, :3].T + transform[:3, 3], faces))
+        if len(shape.faces):
+            model.spaces.append(Space(name, shape.placed(), shape.faces))
         return
-    if any(product.is_a(name) for name in NOT_OBJECTS + NOT_OBJECTS_2X3) and not product.is_a("IfcSite"):
+    if not _is_object(product):
         return
-    name = product.Name or product.GlobalId
-    kind = product.is_a()
-    if roles.leaves_out(name, product.GlobalId, kind):
+    if roles.leaves_out(name, guid, kind):
         model.skip(name, f"{kind}: left out as asked")
         return
-    glazed = "glass: a transparent material" if _glazed(shape) else ""
-    taken = roles.of_product(
-        product.is_a,
-        f"{name} {product.ObjectType or ''}",
-        kind,
-        in_curtain_wall=_in_curtain_wall(product),
+    taken = _taken(product, shape, roles, metres)
+    model.parts.append(
+        Part(
+            name,
+            kind,
+            taken.role,
+            shape.key,
+            shape.vertices,
+            shape.faces,
+            shape.transform,
+            guid=guid,
+            why=taken.why,
+            colours=shape.colours,
+        )
+    )
+
+
+def _taken(product: object, shape: Shape, roles: RoleRules, metres: float) -> Taken:
+    """What a product is taken for; a part of a wall or slab that has layers is what the whole is."""
+    whole = _whole(product)
+    as_what = whole if whole is not None and product.is_a("IfcBuildingElementPart") else product
+    glazed = "glass: a surface style lets light pass" if shape.glazed else glass_material(product, roles, metres)
+    if not glazed and as_what is not product and not associations(product):
+        glazed = glass_material(as_what, roles, metres)
+    names = (product.Name, getattr(product, "ObjectType", None), getattr(type_of(product), "Name", None))
+    return roles.of_product(
+        as_what.is_a,
+        " ".join(filter(None, names)),
+        product.is_a(),
+        in_curtain_wall=getattr(product, "PredefinedType", None) == "CURTAIN_PANEL"
+        or (whole is not None and whole.is_a("IfcCurtainWall")),
         glazed=glazed,
     )
-    key = shape.geometry.id
-    model.parts.append(
-        Part(name, kind, taken.role, key, vertices, faces, transform, guid=product.GlobalId, why=taken.why)
-    )
 
 
-def _buffers(shape: object) -> tuple[np.ndarray, np.ndarray]:
-    vertices = np.array(shape.geometry.verts, np.float64).reshape(-1, 3)
-    return vertices, np.array(shape.geometry.faces, np.int32).reshape(-1, 3)
+def _whole(product: object) -> object | None:
+    """The element that a product is a part of; None if it is none's."""
+    links = getattr(product, "Decomposes", None) or ()
+    wholes = [link.RelatingObject for link in links if link.RelatingObject is not None]
+    return next((whole for whole in wholes if whole.is_a("IfcElement")), None)
 
 
-def _in_curtain_wall(product: object) -> bool:
-    if getattr(product, "PredefinedType", None) == "CURTAIN_PANEL":
-        return True
-    return any(link.RelatingObject.is_a("IfcCurtainWall") for link in getattr(product, "Decomposes", None) or ())
+def _room_boxes(products: dict) -> dict[int, Shape]:
+    """Shapes of the bounding boxes that rooms are given as, of those that have no other, by their numbers."""
+    found = {}
+    for number, product in products.items():
+        if not product.is_a("IfcSpace") or product.Representation is None:
+            continue
+        for representation in product.Representation.Representations or ():
+            if (representation.RepresentationIdentifier or "").lower() == "box":
+                shape = shape_alone(product, representation)
+                if shape is not None and len(shape.faces):
+                    found[number] = shape
+    return found
 
 
-def _glazed(shape: object) -> bool:
-    """Whether any face has a transparent material: calling a part-glazed object transparent hides nothing wrongly."""
-    used = {i for i in shape.geometry.material_ids if i >= 0}
-    levels = [shape.geometry.materials[i].transparency for i in used]
-    return any(level is not None and level > TRANSPARENCY for level in levels)
+def _note_rooms(products: dict, shapes: dict, boxes: dict, lost: dict, model: Model) -> None:
+    """List the rooms without a body; where a bounding box is given it stands for the room."""
+    rooms = [product for product in products.values() if product.is_a("IfcSpace")]
+    for product in sorted(rooms, key=lambda product: (product.GlobalId or "", product.id())):
+        number = product.id()
+        if number in shapes and len(shapes[number].faces):
+            continue
+        why = lost.get(number, "no representation" if product.Representation is None else _reason(product))
+        if number in boxes:
+            model.spaces.append(Space(_name(product), boxes[number].placed(), boxes[number].faces))
+            why += ": its bounding box stands for it"
+        model.skip(f"{LOST_ROOM}{_name(product)!r} (IfcSpace {product.GlobalId})", why)
 
 
-def _note_failures(ifc: object, shapes: dict, model: Model) -> None:
-    """List the products that have a representation but gave no shape."""
+def _reason(product: object) -> str:
+    """Why a product's representation gave no shape, by the geometry library's log."""
     import ifcopenshell
 
-    reasons = dict(re.findall(r"^\[error\].*?\{([^}]{22})\} ([^\n]+)", ifcopenshell.get_log(), re.MULTILINE))
-    for product in sorted(ifc.by_type("IfcElement"), key=lambda product: product.GlobalId):
-        if product.Representation is None or product.GlobalId in shapes:
-            continue
-        if any(product.is_a(name) for name in NOT_OBJECTS + NOT_OBJECTS_2X3):
-            continue
-        reason = reasons.get(product.GlobalId, "no geometry that can be triangulated").strip().rstrip(":")
-        model.skip(f"{product.is_a()} {product.GlobalId}", reason)
+    found = re.findall(r"^\[error\].*?\{([^}]{22})\} ([^\n]+)", ifcopenshell.get_log(), re.MULTILINE)
+    reason = dict(found).get(product.GlobalId, "no geometry that can be triangulated")
+    return reason.strip().rstrip(":")
+
+
+def _note_failures(products: dict, shapes: dict, lost: dict, model: Model) -> None:
+    """List the elements that have a representation but gave no shape."""
+    for product in sorted(products.values(), key=lambda product: (product.GlobalId or "", product.id())):
+        number = product.id()
+        if not product.is_a("IfcSpace") and _is_object(product) and number not in shapes:
+            if number in lost or product.Representation is not None:
+                model.skip(f"{product.is_a()} {product.GlobalId}", lost.get(number) or _reason(product))
+
+
+def _note_others(products: dict, shapes: dict, model: Model) -> None:
+    """Count the products that have a shape but are no things, such as zones and storeys."""
+    others = Counter(
+        products[number].is_a()
+        for number in shapes
+        if not products[number].is_a("IfcSpace") and not _is_object(products[number])
+    )
+    for kind in sorted(others):
+        model.skip(f"{others[kind]} {kind}", f"{kind}: nothing that anybody could see")
+
+
+def _note_repeats(products: list, model: Model) -> None:
+    """List GlobalIds that stand for several products, and count names that do."""
+    by_guid, by_name = defaultdict(list), Counter()
+    for product in products:
+        by_guid[product.GlobalId].append(product)
+        if _is_object(product) and product.Name:
+            by_name[product.Name] += 1
+    for guid, same in sorted(by_guid.items(), key=lambda item: item[0] or ""):
+        if len(same) > 1:
+            named = ", ".join(f"#{product.id()} {_name(product)!r}" for product in same[:NAMES_SHOWN])
+            model.note(f"GlobalId {guid}", f"stands for {len(same)} products, all kept: {named}")
+    repeated = {name: count for name, count in by_name.items() if count > 1}
+    if repeated:
+        shared = f"{len(repeated)} names stand for {sum(repeated.values())} objects"
+        model.note("names of objects", f"{shared}: GlobalIds tell them apart")
 
 
 def _find_openings(ifc: object, shapes: dict, model: Model) -> None:
@@ -185,22 +315,16 @@ def _find_openings(ifc: object, shapes: dict, model: Model) -> None:
 
     The void, not the leaf in it: a leaf's box may be smaller than its hole, and one crack is enough to leak.
     """
-    voids = sorted(_shapes(ifc, include=("IfcOpeningElement",)), key=lambda shape: shape.guid)
-    boxed = {shape.guid for shape in voids}
-    model.openings += [_box(shape) for shape in voids if len(shape.geometry.faces)]
+    voids = shapes_of(ifc, include=_by_type(ifc, "IfcOpeningElement"))
+    guid = {product.id(): product.GlobalId or "" for product in ifc.by_type("IfcProduct")}
+    boxed = sorted((number for number in voids if len(voids[number].faces)), key=lambda number: (guid[number], number))
+    model.openings += [voids[number].box() for number in boxed]
     filled = {
-        link.RelatedBuildingElement.GlobalId
+        link.RelatedBuildingElement.id()
         for link in _by_type(ifc, "IfcRelFillsElement")
-        if link.RelatingOpeningElement.GlobalId in boxed
+        if link.RelatingOpeningElement.id() in boxed
     }
-    fillers = [product for name in ("IfcDoor", "IfcWindow", "IfcPlate") for product in _by_type(ifc, name)]
-    for guid in sorted({product.GlobalId for product in fillers} - filled):
-        if guid in shapes and len(shapes[guid].geometry.faces):
-            model.openings.append(_box(shapes[guid]))
-
-
-def _box(shape: object) -> np.ndarray:
-    vertices, _ = _buffers(shape)
-    transform = np.array(shape.transformation.matrix, np.float64).reshape(4, 4).T
-    placed = vertices @ transform[:3, :3].T + transform[:3, 3]
-    return np.array([placed.min(axis=0), placed.max(axis=0)])
+    fillers = {product.id() for name in ("IfcDoor", "IfcWindow", "IfcPlate") for product in _by_type(ifc, name)}
+    for number in sorted(fillers - filled, key=lambda number: (guid[number], number)):
+        if number in shapes and len(shapes[number].faces):
+            model.openings.append(shapes[number].box())

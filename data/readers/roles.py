@@ -37,6 +37,17 @@ WINDOW = frozenset(
     "raam ramen venster vensters dakraam "
     "vindue vinduer vindu vinduet fonster fonstret ikkuna ikkunat".split()
 )
+# Beside a word for glass these make it insulation or reinforcement, through which nobody sees.
+NO_GLASS = frozenset(
+    "wool fibre fibres fiber fibers fibreglass fiberglass foam foamed foamglas foamglass cellular cellglas reinforced "
+    "wolle faser fasern schaumglas schaum gewebe vlies laine fibra fibras lana lane vezel vezels wol uld ull kuitu "
+    "villa".split()
+)
+# Layers between panes.
+AIR = frozenset(
+    "air luft luftschicht luftraum hohlraum scheibenzwischenraum aire aria lucht luchtspouw spouw lame ilma gap cavity "
+    "argon krypton xenon gas gaz vide vuoto vacuum".split()
+)
 DOOR = frozenset(
     "door doors doorleaf "
     "tur turen tuer tueren ture turblatt tor "
@@ -124,7 +135,7 @@ class RoleRules:
 
         Args:
             is_a: whether the product's class is, or inherits from, the class of that name.
-            name: the product's name and type, to tell proxies of furniture.
+            name: the product's name and its type's: glass if it says so, and to tell proxies of furniture.
             kind: its class.
             in_curtain_wall: it is a part of a curtain wall, whose plates are panes.
             glazed: by which of its materials one sees through it; empty if none is known.
@@ -141,9 +152,15 @@ class RoleRules:
             return Taken(Role.TRANSPARENT, kind, why)
         if self.doors_by and (why := self.named_door(name)):
             return Taken(self.door, kind, why)
+        # A proxy's class says nothing, so its name may say window or door; other classes say that they are neither.
+        proxy = is_a("IfcBuildingElementProxy")
+        if why := self.named_glass(name, "name" if proxy else "product name"):
+            return Taken(Role.TRANSPARENT, kind, why)
+        if proxy and (why := self.named_door(name)):
+            return Taken(self.door, kind, why)
         if any(map(is_a, ACCESSORIES)) or not any(map(is_a, BUILDING)):
             return Taken(Role.DETAIL, kind)
-        if is_a("IfcBuildingElementProxy") and FURNITURE.search(name):
+        if proxy and FURNITURE.search(name):
             return Taken(Role.DETAIL, kind)
         return Taken(Role.OCCLUDER, kind)
 
@@ -169,7 +186,13 @@ class RoleRules:
     def named_glass(self, text: str, what: str) -> str:
         """Why a name stands for glass or a window; empty if it does not."""
         words = GLASS | WINDOW if what == "name" else GLASS
+        if not self.glass and NO_GLASS.intersection(map(_bare, words_of(text))):
+            return ""
         return _found(self.glass, words, GLASS_COMPOUND, text, f"glass: {what}")
+
+    def named_air(self, text: str | None) -> bool:
+        """Whether a layer's material is the air or gas between panes."""
+        return bool(AIR.intersection(map(_bare, words_of(text or ""))))
 
     def named_door(self, text: str) -> str:
         """Why a name stands for a door; empty if it does not."""
