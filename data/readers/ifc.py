@@ -10,12 +10,11 @@ import zipfile
 from collections import Counter, defaultdict
 from pathlib import Path
 
-import numpy as np
-
 from ..errors import InputError
 from ..scene import LOST_ROOM, Scene, Space
 from .assemble import Model, Part, assemble
 from .ifc_materials import associations, glass_material, type_of
+from .ifc_schema import check_classes
 from .ifc_shapes import Shape, keep_bodies, shape_alone, shapes_of
 from .roles import RoleRules, Taken
 from .step import check_step
@@ -60,7 +59,7 @@ def _open(path: Path) -> object:
     import ifcopenshell
 
     content = _content(path)
-    check_step(path, content)
+    entities = check_step(path, content)
     # Old headers are refused by name only; entities of IFC2x are read as those of IFC2x3.
     mended = OLD_SCHEMA.sub(rb"\1IFC2X3\3", content[:65536], count=1) + content[65536:]
     try:
@@ -71,6 +70,7 @@ def _open(path: Path) -> object:
                 copy = Path(folder) / "copy.ifc"
                 copy.write_bytes(mended)
                 ifc = ifcopenshell.open(str(copy))
+        check_classes(path, ifc.schema_identifier, entities)
         if not ifc.by_type("IfcProject"):
             raise InputError(f"{path}: expected an IfcProject, which says the unit of length, found none")
         return ifc

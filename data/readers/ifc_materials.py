@@ -1,4 +1,4 @@
-"""Glass told by what an IFC file says of materials: their styles and names, in layers, lists, constituents, profiles."""
+"""Glass told by what an IFC file says of materials: styles and names, in layers, lists, constituents and profiles."""
 
 from collections.abc import Iterator
 

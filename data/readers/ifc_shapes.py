@@ -175,7 +175,7 @@ def _shape(pieces: list) -> Shape:
         offset += len(vertices[-1])
     transform = np.array(pieces[0].transformation.matrix, np.float64).reshape(4, 4).T
     painted = np.concatenate(colours)
-    styled = len(painted) and painted[:, 3].min() >= 0 or (painted[:, 3] >= 0).any()
+    styled = (len(painted) and painted[:, 3].min() >= 0) or (painted[:, 3] >= 0).any()
     levels = [
         piece.geometry.materials[i].transparency for piece in pieces for i in {*piece.geometry.material_ids} if i >= 0
     ]

@@ -5,6 +5,7 @@ damage, such as a placement relative to itself, ends the process. So the whole t
 """
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +29,17 @@ RELATION = b"IFCREL"
 SHOWN = 60
 
 
-def check_step(path: Path, content: bytes) -> None:
-    """Every statement of the file is whole, every entity is defined once, and none refers to nothing or to itself.
+@dataclass(frozen=True)
+class Entity:
+    """A statement: its number, class in capitals, and the text between its brackets without blanks and strings."""
+
+    number: int
+    kind: bytes
+    inside: bytes
+
+
+def check_step(path: Path, content: bytes) -> list[Entity]:
+    """Entities of a file, every statement of which is whole: each is defined once, none refers to nothing or to itself.
 
     Args:
         path: named in errors.
@@ -51,11 +61,12 @@ def check_step(path: Path, content: bytes) -> None:
     statements = DATA.sub(b"", re.sub(rb"\bENDSEC\s*;", b"", bare[begin.end() : end.start()])).split(b";")
     if statements[-1].strip():
         raise InputError(f"{path}: expected a statement that ends in ;, found {_shown(statements[-1])}")
-    _check_references(path, [_entity(path, statement) for statement in statements[:-1]])
+    entities = [_entity(path, statement) for statement in statements[:-1]]
+    _check_references(path, entities)
+    return entities
 
 
-def _entity(path: Path, statement: bytes) -> tuple[int, bytes, list[int]]:
-    """Number and class of the entity that a statement defines, and the numbers of those that it refers to."""
+def _entity(path: Path, statement: bytes) -> Entity:
     dense = BLANKS.sub(b"", statement)
     found = ENTITY.fullmatch(dense)
     if not found:
@@ -63,22 +74,23 @@ def _entity(path: Path, statement: bytes) -> tuple[int, bytes, list[int]]:
     inside = found[3]
     if inside and not (ITEMS.fullmatch(inside) and inside.count(b"(") == inside.count(b")")):
         raise InputError(f"{path}: expected values between commas, found {_shown(statement)}")
-    return int(found[1]), found[2].upper(), [int(number) for number in REFERENCE.findall(inside)]
+    return Entity(int(found[1]), found[2].upper(), inside)
 
 
-def _check_references(path: Path, entities: list[tuple[int, bytes, list[int]]]) -> None:
+def _check_references(path: Path, entities: list[Entity]) -> None:
     """Entities are defined once; what they refer to is defined, and leads back to none of them."""
     known: dict[int, int] = {}
-    for place, (number, _, _) in enumerate(entities):
-        if known.setdefault(number, place) != place:
-            raise InputError(f"{path}: expected every entity once, found #{number} twice")
+    for place, entity in enumerate(entities):
+        if known.setdefault(entity.number, place) != place:
+            raise InputError(f"{path}: expected every entity once, found #{entity.number} twice")
     owners, to = [], []
-    for place, (number, kind, references) in enumerate(entities):
+    for place, entity in enumerate(entities):
+        references = [int(number) for number in REFERENCE.findall(entity.inside)]
         for reference in references:
             if reference not in known:
-                wanted = f"#{reference}, which #{number} refers to"
+                wanted = f"#{reference}, which #{entity.number} refers to"
                 raise InputError(f"{path}: expected {wanted}, found no such entity: cut off?")
-        if not kind.startswith(RELATION):
+        if not entity.kind.startswith(RELATION):
             owners += [place] * len(references)
             to += [known[reference] for reference in references]
     links = coo_matrix((np.ones(len(to), np.int8), (owners, to)), shape=(len(entities), len(entities)))
@@ -86,7 +98,7 @@ def _check_references(path: Path, entities: list[tuple[int, bytes, list[int]]]) 
     own = np.flatnonzero(np.equal(owners, to))
     circle = np.array(owners, int)[own[:1]] if len(own) else np.flatnonzero(np.bincount(component)[component] > 1)
     if len(circle):
-        found = ", ".join(f"#{entities[place][0]}" for place in circle[:4])
+        found = ", ".join(f"#{entities[place].number}" for place in circle[:4])
         raise InputError(f"{path}: expected no entity to lead back to itself, found {found}")
 
 
