@@ -1,4 +1,4 @@
-"""Model readers: IFC, meshes and scene folders, chosen by the path."""
+"""Model readers: IFC, gbXML, meshes and scene folders, chosen by the path."""
 
 import hashlib
 from pathlib import Path
@@ -9,6 +9,7 @@ from .assemble import Model
 from .roles import RoleRules
 
 IFC_SUFFIXES = (".ifc", ".ifczip")
+GBXML_SUFFIXES = (".gbxml", ".xml", ".zip")
 MESH_SUFFIXES = (".bsp", ".dxf", ".glb", ".gltf", ".obj", ".ply", ".stl")
 UP_CHOICES = (None, "y", "z")
 
@@ -27,8 +28,8 @@ def read(
     """The model in a file or scene folder, as a scene ready to bake.
 
     Args:
-        path: .ifc, .ifczip, .glb, .gltf, .obj, .ply, .stl, .dxf, .bsp (a compiled Quake map), or a folder written by
-            `write_scene`.
+        path: .ifc, .ifczip, .gbxml, .xml, .zip (with a gbXML file), .glb, .gltf, .obj, .ply, .stl, .dxf, .bsp (a
+            compiled Quake map), or a folder written by `write_scene`.
         up: axis that points up in a mesh file, "y" or "z"; by default y for glTF, which says so, and z for the others.
         unit: unit of a mesh file's numbers: a name such as "millimetre", or metres as a number; by default what a DXF
             states, 1/32 m for a map, and the metre for the others.
@@ -54,15 +55,21 @@ def read(
     if suffix == ".map":
         how = "compile it with qbsp of ericw-tools, and read the .bsp"
         raise InputError(f"{path}: expected a compiled map, found the source of one: {how}")
-    if suffix not in IFC_SUFFIXES + MESH_SUFFIXES:
-        raise InputError(f"{path}: expected {', '.join(IFC_SUFFIXES + MESH_SUFFIXES)} or a folder, found {suffix!r}")
+    known = IFC_SUFFIXES + GBXML_SUFFIXES + MESH_SUFFIXES
+    if suffix not in known:
+        raise InputError(f"{path}: expected {', '.join(known)} or a folder, found {suffix!r}")
     model = Model(source=str(path), sha256=_sha256(path), unit="metre", grid_m=grid_m)
-    if suffix in IFC_SUFFIXES:
+    if suffix in IFC_SUFFIXES + GBXML_SUFFIXES:
         if up == "y" or unit is not None:
-            raise InputError(f"{path}: expected no up or unit for IFC, which states its own, found {up or unit}")
-        from .ifc import read_ifc
+            what = "IFC" if suffix in IFC_SUFFIXES else "gbXML"
+            raise InputError(f"{path}: expected no up or unit for {what}, which states its own, found {up or unit}")
+        if suffix in IFC_SUFFIXES:
+            from .ifc import read_ifc
 
-        return read_ifc(path, model, roles)
+            return read_ifc(path, model, roles)
+        from .gbxml import read_gbxml
+
+        return read_gbxml(path, model, roles)
     from .mesh import read_mesh
 
     return read_mesh(path, model, up=up, unit=unit, roles=roles)

@@ -6,12 +6,12 @@ in the file, because a GlobalId may stand there twice. Products that share one g
 
 import re
 import tempfile
-import zipfile
 from collections import Counter, defaultdict
 from pathlib import Path
 
 from ..errors import InputError
 from ..scene import LOST_ROOM, Scene, Space
+from .archive import only_file
 from .assemble import Model, Part, assemble
 from .ifc_materials import associations, glass_material, type_of
 from .ifc_schema import check_classes
@@ -27,8 +27,6 @@ NOT_OBJECTS_2X3 = ("IfcFeatureElement", "IfcSpatialStructureElement", "IfcPort",
 UNSEEN = ("IfcOpeningElement", "IfcAnnotation", "IfcGrid")
 OLD_SCHEMA = re.compile(rb"(FILE_SCHEMA\s*\(\s*\(\s*')(IFC2X_FINAL|IFC2X2_FINAL|IFC2X2|IFC2X)(')", re.IGNORECASE)
 STAR = re.compile(r"[(,]\*[,)]")
-# Far beyond what text of this kind shrinks to.
-MAX_ZIP_RATIO, MAX_ZIP_BYTES = 200, 8 * 2**30
 NAMES_SHOWN = 5
 
 
@@ -81,30 +79,13 @@ def _open(path: Path) -> object:
 
 
 def _content(path: Path) -> bytes:
-    """The text of the IFC file.
-
-    Raises:
-        InputError: it cannot be read, or the archive does not hold one IFC file of a credible size.
-    """
+    """The text of the IFC file."""
+    if path.suffix.lower() == ".ifczip":
+        return only_file(path, (".ifc",))
     try:
-        if path.suffix.lower() != ".ifczip":
-            return path.read_bytes()
-        with zipfile.ZipFile(path) as archive:
-            inside = [entry for entry in archive.infolist() if entry.filename.lower().endswith(".ifc")]
-            if len(inside) != 1:
-                raise InputError(f"{path}: expected one .ifc file in the archive, found {len(inside)}")
-            size, packed = inside[0].file_size, max(1, inside[0].compress_size)
-            if size > MAX_ZIP_BYTES or size > MAX_ZIP_RATIO * packed + 2**20:
-                raise InputError(
-                    f"{path}: expected a file that shrank at most {MAX_ZIP_RATIO} times, found {size} bytes"
-                )
-            return archive.read(inside[0])
-    except InputError:
-        raise
+        return path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: expected a readable file, found {error.strerror}") from None
-    except Exception as error:  # zipfile raises its own, zlib's, and what encryption and unknown methods bring
-        raise InputError(f"{path}: expected a zip archive with an IFC file, found {error}") from None
 
 
 def _take_all(ifc: object, model: Model, roles: RoleRules) -> None:

@@ -1,0 +1,137 @@
+"""gbXML files once more: areas by Newell's formula and by lines swept over a surface, without triangles."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+from zipfile import ZipFile, is_zipfile
+
+import numpy as np
+
+from ...data.scene import Scene
+from .referee import Found, differences
+
+METRES = {
+    "kilometers": 1000.0,
+    "meters": 1.0,
+    "centimeters": 0.01,
+    "millimeters": 0.001,
+    "miles": 1609.344,
+    "yards": 0.9144,
+    "feet": 0.3048,
+    "inches": 0.0254,
+}
+# An area that vanishes [m2].
+NO_AREA = 1e-9
+
+
+def differences_gbxml(scene: Scene, path: Path) -> list[str]:
+    """What a scene has otherwise than its file: surfaces, windows, doors and spaces, lost, extra, moved or altered.
+
+    Args:
+        scene: as read from the file, nothing left out.
+        path: the .xml file, or a zip archive with it alone.
+    """
+    root = ElementTree.fromstring(_content(path))
+    metres = METRES[root.get("lengthUnit", "Meters").strip().lower()]
+    lines = differences(scene, _things(root, metres))
+    wanted = sorted(space.findtext("{*}Name") or space.get("id") for space in root.iter() if _is(space, "Space"))
+    named = [space.name for space in scene.spaces]
+    lost = [lost["what"] for lost in scene.skipped]
+    for name in sorted({*wanted, *named}):
+        count = named.count(name) + sum(f"{name!r} (Space " in what for what in lost)
+        if count != wanted.count(name):
+            lines.append(f"room {name!r}: expected {wanted.count(name)} as a second reader finds, found {count}")
+    return lines
+
+
+def _content(path: Path) -> bytes:
+    if not is_zipfile(path):
+        return path.read_bytes()
+    with ZipFile(path) as archive:
+        return archive.read(archive.infolist()[0])
+
+
+def _is(element: ElementTree.Element, name: str) -> bool:
+    return element.tag.split("}")[-1] == name
+
+
+def _things(root: ElementTree.Element, metres: float) -> Iterator[Found]:
+    """Every surface and opening that is not air."""
+    for surface in root.iter():
+        if not _is(surface, "Surface"):
+            continue
+        outer = _corners(surface, metres)
+        holes = []
+        for opening in surface.findall("{*}Opening"):
+            ring = _corners(opening, metres)
+            holes.append(ring)
+            if opening.get("openingType") != "Air" and np.linalg.norm(_newell(ring)) > NO_AREA:
+                yield Found(opening.get("id"), _box(ring), float(np.linalg.norm(_newell(ring))))
+        area = _left(outer, holes) if len(outer) > 2 else 0.0
+        if surface.get("surfaceType") != "Air" and area > NO_AREA:
+            yield Found(surface.get("id"), _box(outer), area)
+
+
+def _corners(owner: ElementTree.Element, metres: float) -> np.ndarray:
+    """Corners of the owner's polygon [m], shape (n, 3)."""
+    loop = owner.find("{*}PlanarGeometry/{*}PolyLoop")
+    points = [[float(x.text) for x in point.findall("{*}Coordinate")] for point in loop.findall("{*}CartesianPoint")]
+    return np.array(points, float).reshape(-1, 3) * metres
+
+
+def _box(ring: np.ndarray) -> np.ndarray:
+    return np.array([ring.min(axis=0), ring.max(axis=0)])
+
+
+def _newell(ring: np.ndarray) -> np.ndarray:
+    """Normal of a polygon, as long as its area [m2]."""
+    normal = np.zeros(3)
+    for a, b in zip(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0], strict=True):
+        normal += (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    return normal / 2
+
+
+def _left(outer: np.ndarray, holes: list[np.ndarray]) -> float:
+    """Area of a polygon that its holes leave [m2], whether or not they overlap or reach beyond it."""
+    normal = _newell(outer)
+    area = float(np.linalg.norm(normal))
+    if not holes or area == 0:
+        return area
+    # Its shadow along an axis is smaller by the share of the normal that lies along it.
+    axis = int(np.abs(normal).argmax())
+    flat = [np.delete(ring, axis, axis=1) for ring in (outer, *holes)]
+    levels = sorted({y for ring in flat for y in ring[:, 1]} | set(_meetings(flat)))
+    shadow = sum((high - low) * _length(flat, (low + high) / 2) for low, high in zip(levels, levels[1:], strict=False))
+    return shadow * area / abs(normal[axis])
+
+
+def _meetings(rings: list[np.ndarray]) -> Iterator[float]:
+    """Heights at which sides of two rings cross."""
+    sides = [(ring[i - 1], ring[i]) for ring in rings for i in range(len(ring))]
+    for i, (a, b) in enumerate(sides):
+        for c, d in sides[:i]:
+            (ux, uy), (vx, vy) = b - a, d - c
+            turn = ux * vy - uy * vx
+            if turn:
+                share = ((c[0] - a[0]) * vy - (c[1] - a[1]) * vx) / turn
+                other = ((c[0] - a[0]) * uy - (c[1] - a[1]) * ux) / turn
+                if 0 < share < 1 and 0 < other < 1:
+                    yield float(a[1] + share * uy)
+
+
+def _length(rings: list[np.ndarray], y: float) -> float:
+    """Length of the line at height y that lies in the first ring and in no other."""
+    ends = [sorted(_ends(ring, y)) for ring in rings]
+    marks = sorted(x for found in ends for x in found)
+    length = 0.0
+    for a, b in zip(marks, marks[1:], strict=False):
+        middle = (a + b) / 2
+        inside = [sum(x < middle for x in found) % 2 for found in ends]
+        length += (b - a) * (inside[0] and not any(inside[1:]))
+    return length
+
+
+def _ends(ring: np.ndarray, y: float) -> Iterator[float]:
+    for a, b in zip(ring, np.roll(ring, 1, axis=0), strict=True):
+        if min(a[1], b[1]) <= y < max(a[1], b[1]):
+            yield float(a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]))
