@@ -1,5 +1,6 @@
 """The last step of every reader: parts in metres, Z up, become a `Scene`."""
 
+import re
 from collections import Counter
 from collections.abc import Hashable
 from dataclasses import dataclass, field
@@ -7,9 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import InputError
-from ..scene import Definition, Instance, Mesh, Role, Scene, Space, degenerate, snap
+from ..scene import GRID_LIMIT, Definition, Instance, Mesh, Role, Scene, Space, degenerate, snap
 
 MAX_COORDINATE_M = 1.0e9
+# Strays are at most this share of the parts, and further off than this, and than so many times the others reach.
+STRAY_SHARE, STRAY_M, STRAY_TIMES = 0.4, 1000.0, 20.0
+STRAYS_SHOWN = 3
+PLAIN = re.compile(r"[\w ,:#-]+")
 
 
 @dataclass(frozen=True)
@@ -99,13 +104,37 @@ def assemble(model: Model) -> Scene:
 
 def _centre(parts: list[Part], model: Model) -> np.ndarray:
     """Whole metres nearest to the middle of the parts' common box."""
-    low = np.min([part.placed().min(axis=0) for part in parts], axis=0)
-    high = np.max([part.placed().max(axis=0) for part in parts], axis=0)
+    boxes = np.array([[(placed := part.placed()).min(axis=0), placed.max(axis=0)] for part in parts])
+    _find_strays(parts, boxes, model)
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     # Beyond this, float64 no longer resolves the grid and the sums below may overflow.
     reach = np.abs([low, high]).max()
     if reach > MAX_COORDINATE_M:
         raise InputError(f"{model.source}: expected coordinates below {MAX_COORDINATE_M:g} m, found {reach:g} m")
     return np.round((low + high) / 2) + 0.0  # -0.0 becomes 0.0
+
+
+def _find_strays(parts: list[Part], boxes: np.ndarray, model: Model) -> None:
+    """Note the few parts that lie far from all the others, such as a survey point.
+
+    Raises:
+        InputError: one lies so far off that the others do not fit on the grid with it.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused for its size
+        away = np.abs(boxes - np.median(boxes.mean(axis=1), axis=0)).max(axis=(1, 2))
+    near = np.quantile(away, 1 - STRAY_SHARE, method="lower")
+    far = np.flatnonzero(away > max(STRAY_M, STRAY_TIMES * near))
+    if not len(far):
+        return
+    far = far[np.argsort(-away[far], kind="stable")]
+    names = list(dict.fromkeys(parts[i].name for i in far))
+    shown = ", ".join(map(repr, names[:STRAYS_SHOWN])) + (", ..." if len(names) > STRAYS_SHOWN else "")
+    apart = f"{len(far)} of {len(parts)} parts up to {away[far[0]] / 1000:,.0f} km from the others: {shown}"
+    pattern = "|".join(name if PLAIN.fullmatch(name) else re.escape(name) for name in names[:STRAYS_SHOWN])
+    if away[far[0]] > GRID_LIMIT * model.grid_m:
+        reach = f"all parts within {GRID_LIMIT * model.grid_m:g} m of one another"
+        raise InputError(f"{model.source}: expected {reach}, found {apart}; --leave-out '{pattern}' reads the rest")
+    model.note(shown, f"far from all else: {apart}; --leave-out '{pattern}' reads the rest")
 
 
 def _usable(part: Part, model: Model) -> bool:

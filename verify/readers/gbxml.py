@@ -1,6 +1,7 @@
 """gbXML files once more: areas by Newell's formula and by lines swept over a surface, without triangles."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 from zipfile import ZipFile, is_zipfile
@@ -101,7 +102,7 @@ def _left(outer: np.ndarray, holes: list[np.ndarray]) -> float:
     axis = int(np.abs(normal).argmax())
     flat = [np.delete(ring, axis, axis=1) for ring in (outer, *holes)]
     levels = sorted({y for ring in flat for y in ring[:, 1]} | set(_meetings(flat)))
-    shadow = sum((high - low) * _length(flat, (low + high) / 2) for low, high in zip(levels, levels[1:], strict=False))
+    shadow = sum((high - low) * _length(flat, (low + high) / 2) for low, high in pairwise(levels))
     return shadow * area / abs(normal[axis])
 
 
@@ -124,7 +125,7 @@ def _length(rings: list[np.ndarray], y: float) -> float:
     ends = [sorted(_ends(ring, y)) for ring in rings]
     marks = sorted(x for found in ends for x in found)
     length = 0.0
-    for a, b in zip(marks, marks[1:], strict=False):
+    for a, b in pairwise(marks):
         middle = (a + b) / 2
         inside = [sum(x < middle for x in found) % 2 for found in ends]
         length += (b - a) * (inside[0] and not any(inside[1:]))

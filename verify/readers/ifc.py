@@ -1,7 +1,7 @@
 """IFC files once more: product by product, body by body, without the iterator that the reader takes its shapes from."""
 
+import re
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +15,12 @@ NO_THINGS = (
     "IfcVirtualElement"
 ).split()
 # A product's body is all its representations of the first of these names that it has any of.
-BODY_NAMES = (("body",), ("body-fallback",), ("facetation",), ("surface",), ("", "mesh", "tessellation"))
-SOLID_KINDS = ("curve2d", "curve3d", "boundingbox", "annotation2d", "geometriccurveset", "point", "pointcloud")
+BODY_NAMES = ("body", "body-fallback", "facetation", "surface")
+OTHER_NAMES = (
+    "annotation axis boundary box clearance cog footprint lighting plan profile reference row surveypoints walkingline"
+).split()
+FLAT_KINDS = ("curve2d", "curve3d", "boundingbox", "annotation2d", "geometriccurveset", "point", "pointcloud")
+STARRED = re.compile(rb"=\s*(?:IFC\w+\s*\(\s*'[\w$]{22}'|IFCPRODUCTDEFINITIONSHAPE\s*\()[^;]*;", re.IGNORECASE)
 # Less than this nobody can have on a grid of about a millimetre [m2].
 NO_AREA = 1e-12
 
@@ -49,6 +53,8 @@ def _open(path: Path) -> object:
     head, rest = content[:4096], content[4096:]
     for old in (b"IFC2X_FINAL", b"IFC2X2_FINAL"):
         head = head.replace(b"'" + old + b"'", b"'IFC2X3'").replace(b"'" + old.lower() + b"'", b"'IFC2X3'")
+    # Some write * where $ is meant, in entities that have a GUID and in the shapes of products.
+    rest = STARRED.sub(lambda found: re.sub(rb"(?<=[,(])\*(?=[,)])", b"$", found[0]), rest)
     try:
         with tempfile.TemporaryDirectory() as folder:
             copy = Path(folder) / "model.ifc"
@@ -80,13 +86,14 @@ def _bodies(product: object, is_room: bool) -> list:
         one
         for one in every or ()
         if one.Items
-        and _low(one.RepresentationType) not in SOLID_KINDS
+        and _low(one.RepresentationType) not in FLAT_KINDS
         and _low(one.ContextOfItems.ContextType) not in ("plan", "annotation")
     ]
-    for names in BODY_NAMES:
-        if bodies := [one for one in solid if _low(one.RepresentationIdentifier) in names]:
+    for name in BODY_NAMES:
+        if bodies := [one for one in solid if _low(one.RepresentationIdentifier) == name]:
             return bodies
-    return boxes if is_room else []
+    unknown = [one for one in solid if _low(one.RepresentationIdentifier) not in OTHER_NAMES]
+    return unknown or (boxes if is_room else [])
 
 
 def _low(text: str | None) -> str:

@@ -165,11 +165,11 @@ def test_what_is_glass_in_part_hides_nothing(tmp_path, paint, schema):
 
 def test_panes_of_a_curtain_wall_are_glass(tmp_path):
     step = house()
-    panes = [step.box("IfcPlate", f"pane {n}", (500_000_000.0, 9000 + 900 * n, 0), (60, 800, 900)) for n in range(2)]
+    panes = [step.box("IfcPlate", f"plate {n}", (500_000_000.0, 9000 + 900 * n, 0), (60, 800, 900)) for n in range(2)]
     wall = step.add(f"IFCCURTAINWALL('{len(step.lines):022d}',$,'front',$,$,$,$,$)")
     step.add(f"IFCRELAGGREGATES('{len(step.lines):022d}',$,$,$,{wall},({panes[0]}))")
     roles = by_name(read(step.write(tmp_path / "a.ifc")))
-    assert roles["pane 0"] == ("IfcPlate", Role.TRANSPARENT) and roles["pane 1"] == ("IfcPlate", Role.OCCLUDER)
+    assert roles["plate 0"] == ("IfcPlate", Role.TRANSPARENT) and roles["plate 1"] == ("IfcPlate", Role.OCCLUDER)
 
 
 def test_panes_that_say_they_are_panes_are_glass(tmp_path):
