@@ -18,6 +18,7 @@ from .solids import winding_numbers
 SMALLEST_SIDE_M = 0.3
 SMALLEST_ROOM_M3 = 5.0
 SEALED_SHARE = 0.5
+OBLIQUE_SHARE = 0.1
 SHUT_MARGIN_M = 0.01
 # Sample points per axis when a cell's share of the rooms is estimated.
 SAMPLES = 4
@@ -47,8 +48,15 @@ def find_inhabitable(scene: Scene, graph: CellGraph) -> Inhabited:
     if scene.spaces:
         names = _rooms_of(scene, graph, roomy)
         mask = names != ""
+        reason = f"inside the model's {len(scene.spaces)} rooms"
+        if mask.any() and scene.lost_rooms:
+            # Rooms that the model names without a body are among what flooding finds.
+            enclosed, leak = _flood(scene, graph)
+            mask |= enclosed & roomy
+            reason += f", or, for {len(scene.lost_rooms)} without a body, not reached from outside"
+            return Inhabited(mask, names, reason, leak)
         if mask.any():
-            return Inhabited(mask, names, f"inside the model's {len(scene.spaces)} rooms")
+            return Inhabited(mask, names, reason)
     names = np.full(graph.cell_count, "", object)
     enclosed, leak = _flood(scene, graph)
     mask = enclosed & roomy
@@ -66,11 +74,17 @@ def find_inhabitable(scene: Scene, graph: CellGraph) -> Inhabited:
 
 
 def _rooms_of(scene: Scene, graph: CellGraph, roomy: np.ndarray) -> np.ndarray:
-    """Name of the room that holds more than half of each cell, "" elsewhere."""
+    """Name of the room that holds more than half of each cell, "" elsewhere.
+
+    A room that holds half of none, such as one that stands oblique to the cells, names the cell that holds most of it
+    and those of which it holds a tenth.
+    """
     share = np.zeros(graph.cell_count)
     names = np.full(graph.cell_count, "", object)
     steps = (np.arange(SAMPLES) + 0.5) / SAMPLES
     unit = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    volume = np.prod((graph.cells[:, 1] - graph.cells[:, 0]) * scene.grid_m, axis=1)
+    held: list[tuple[str, np.ndarray]] = []
     for space in scene.spaces:
         corners = space.vertices[space.faces] / scene.grid_m
         low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
@@ -84,7 +98,14 @@ def _rooms_of(scene: Scene, graph: CellGraph, roomy: np.ndarray) -> np.ndarray:
         better = mine > share[near]
         share[near] += mine
         names[near[better & (mine > 0)]] = space.name or "room"
+        if mine.any():
+            most = np.arange(len(near)) == (mine * volume[near]).argmax()
+            held.append((space.name or "room", near[most | (mine > OBLIQUE_SHARE)]))
     names[share <= 0.5] = ""
+    found = set(names)
+    for name, cells in held:
+        if name not in found:
+            names[cells] = [f"{other}, {name}" if other else name for other in names[cells]]
     return names
 
 

@@ -318,7 +318,9 @@ def _add_spaces(building: _Building) -> None:
     for key, name in building.names.items():
         rings = building.shells.get(key) or building.sides.get(key, [])
         if len(rings) < 4:
-            building.model.skip(f"{LOST_ROOM}{name!r} (Space {key})", "no shell, and no surfaces that enclose it")
+            building.model.skip(
+                f"{LOST_ROOM}{name!r} (Space {key})", "a room without a body: no shell, and no surfaces that enclose it"
+            )
             continue
         pieces = [ring_triangles(ring, []) for ring in rings]
         starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])

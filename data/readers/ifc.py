@@ -242,7 +242,8 @@ def _note_rooms(products: dict, shapes: dict, boxes: dict, lost: dict, model: Mo
         if number in boxes:
             model.spaces.append(Space(_name(product), boxes[number].placed(), boxes[number].faces))
             why += ": its bounding box stands for it"
-        model.skip(f"{LOST_ROOM}{_name(product)!r} (IfcSpace {product.GlobalId})", why)
+        what = f"{LOST_ROOM}{_name(product)!r} (IfcSpace {product.GlobalId})"
+        model.skip(what, f"a room without a body: {why}")
 
 
 def _reason(product: object) -> str:

@@ -129,7 +129,14 @@ class RoleRules:
         return bool(self.leave_out) and any(re.search(self.leave_out, text, re.IGNORECASE) for text in texts)
 
     def of_product(
-        self, is_a: Callable[[str], bool], name: str, kind: str, *, in_curtain_wall: bool = False, glazed: str = ""
+        self,
+        is_a: Callable[[str], bool],
+        name: str,
+        kind: str,
+        *,
+        in_curtain_wall: bool = False,
+        glazed: str = "",
+        by_words: bool = True,
     ) -> Taken:
         """Role of an IFC product.
 
@@ -139,6 +146,7 @@ class RoleRules:
             kind: its class.
             in_curtain_wall: it is a part of a curtain wall, whose plates are panes.
             glazed: by which of its materials one sees through it; empty if none is known.
+            by_words: whether words for glass in its name count, where its class does not say glass.
         """
         if glazed:
             return Taken(Role.TRANSPARENT, kind, glazed)
@@ -154,9 +162,9 @@ class RoleRules:
             return Taken(self.door, kind, why)
         # A proxy's class says nothing, so its name may say window or door; other classes say that they are neither.
         proxy = is_a("IfcBuildingElementProxy")
-        if why := self.named_glass(name, "name" if proxy else "product name"):
+        if by_words and (why := self.named_glass(name, "name" if proxy else "product name")):
             return Taken(Role.TRANSPARENT, kind, why)
-        if proxy and (why := self.named_door(name)):
+        if by_words and proxy and (why := self.named_door(name)):
             return Taken(self.door, kind, why)
         if any(map(is_a, ACCESSORIES)) or not any(map(is_a, BUILDING)):
             return Taken(Role.DETAIL, kind)
@@ -176,7 +184,7 @@ class RoleRules:
         if why := see_through or self.named_glass(material, "material"):
             return Taken(Role.TRANSPARENT, kind, why if why.startswith("glass") else f"glass: {why}")
         if kind != "Mesh":
-            return self.of_product(_ancestors(kind).__contains__, name, kind, in_curtain_wall=True)
+            return self.of_product(_ancestors(kind).__contains__, name, kind, in_curtain_wall=True, by_words=False)
         if why := self.named_glass(name, "name"):
             return Taken(Role.TRANSPARENT, kind, why)
         if why := self.named_door(name):

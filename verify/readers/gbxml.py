@@ -33,8 +33,7 @@ def differences_gbxml(scene: Scene, path: Path) -> list[str]:
         path: the .xml file, or a zip archive with it alone.
     """
     root = ElementTree.fromstring(_content(path))
-    metres = METRES[root.get("lengthUnit", "Meters").strip().lower()]
-    lines = differences(scene, _things(root, metres))
+    lines = differences(scene, found_gbxml(path))
     wanted = sorted(space.findtext("{*}Name") or space.get("id") for space in root.iter() if _is(space, "Space"))
     named = [space.name for space in scene.spaces]
     lost = [lost["what"] for lost in scene.skipped]
@@ -43,6 +42,12 @@ def differences_gbxml(scene: Scene, path: Path) -> list[str]:
         if count != wanted.count(name):
             lines.append(f"room {name!r}: expected {wanted.count(name)} as a second reader finds, found {count}")
     return lines
+
+
+def found_gbxml(path: Path) -> Iterator[Found]:
+    """Surfaces and openings of a gbXML file, but for those of air, by their ids."""
+    root = ElementTree.fromstring(_content(path))
+    yield from _things(root, METRES[root.get("lengthUnit", "Meters").strip().lower()])
 
 
 def _content(path: Path) -> bytes:

@@ -2,7 +2,9 @@
 
 import re
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
+from zipfile import ZipFile, is_zipfile
 
 import numpy as np
 
@@ -35,21 +37,32 @@ def differences_ifc(scene: Scene, path: Path) -> list[str]:
     Raises:
         InputError: the file cannot be opened.
     """
-    things, rooms = [], []
-    ifc = _open(path)
-    for product in ifc.by_type("IfcProduct"):
-        is_room = product.is_a("IfcSpace")
-        if is_room or product.is_a("IfcSite") or not any(map(product.is_a, NO_THINGS)):
-            found = _found(product, is_room)
+    things = differences(scene, found_ifc(path))
+    return things + [f"room {line}" for line in differences(_of_rooms(scene), found_ifc(path, rooms=True))]
+
+
+def found_ifc(path: Path, rooms: bool = False) -> Iterator[Found]:
+    """Objects of an .ifc or .ifczip file by their GUIDs, or its rooms by their names.
+
+    Raises:
+        InputError: the file cannot be opened.
+    """
+    for product in _open(path).by_type("IfcProduct"):
+        if product.is_a("IfcSpace") != rooms:
+            continue
+        if rooms or product.is_a("IfcSite") or not any(map(product.is_a, NO_THINGS)):
+            found = _found(product, rooms)
             if found is not None:
-                (rooms if is_room else things).append(found)
-    return differences(scene, things) + [f"room {line}" for line in differences(_of_rooms(scene), rooms)]
+                yield found
 
 
 def _open(path: Path) -> object:
     import ifcopenshell
 
     content = path.read_bytes()
+    if is_zipfile(path):
+        with ZipFile(path) as archive:
+            content = archive.read(next(name for name in archive.namelist() if name.lower().endswith(".ifc")))
     head, rest = content[:4096], content[4096:]
     for old in (b"IFC2X_FINAL", b"IFC2X2_FINAL"):
         head = head.replace(b"'" + old + b"'", b"'IFC2X3'").replace(b"'" + old.lower() + b"'", b"'IFC2X3'")
