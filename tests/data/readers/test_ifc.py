@@ -1,7 +1,14 @@
-from pathlib import Path
+import os
+import subprocess
+import sys
+from collections import Counter
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
+from builders.awkward import HOUSE, assert_house, boxes, ifc_case
+from builders.mutated import mutated
+from builders.step_house import Step, house
 from viewcell.data.errors import InputError
 from viewcell.data.readers import read
 from viewcell.data.readers.roles import RoleRules
@@ -59,80 +66,6 @@ def test_role_needs_more_than_the_class():
     assert RoleRules("closed").of_product(door.is_a, "", "IfcDoor").role is Role.OCCLUDER
     assert RoleRules().of_product(proxy.is_a, "Office chair 12", "").role is Role.DETAIL
     assert RoleRules().of_product(plate.is_a, "", "", in_curtain_wall=True).role is Role.TRANSPARENT
-
-
-class Step:
-    """A small IFC2x3 file in millimetres: boxes extruded from rectangles."""
-
-    def __init__(self, schema: str = "IFC2X3"):
-        self.schema = schema
-        self.lines = [
-            "#1=IFCSIUNIT(*,.LENGTHUNIT.,.MILLI.,.METRE.);",
-            "#2=IFCUNITASSIGNMENT((#1));",
-            "#3=IFCCARTESIANPOINT((0.,0.,0.));",
-            "#4=IFCAXIS2PLACEMENT3D(#3,$,$);",
-            "#5=IFCGEOMETRICREPRESENTATIONCONTEXT($,'Model',3,1.E-5,#4,$);",
-            "#6=IFCPROJECT('0000000000000000000000',$,'p',$,$,$,$,(#5),#2);",
-            "#7=IFCCARTESIANPOINT((0.,0.));",
-            "#8=IFCAXIS2PLACEMENT2D(#7,$);",
-            "#9=IFCDIRECTION((0.,0.,1.));",
-        ]
-
-    def add(self, text: str) -> str:
-        self.lines.append(f"#{len(self.lines) + 1}={text};")
-        return f"#{len(self.lines)}"
-
-    def solid(self, size: tuple, transparency: float | None = None) -> str:
-        """A box, in a colour that lets so much light pass."""
-        x, y, z = (float(length) for length in size)
-        profile = self.add(f"IFCRECTANGLEPROFILEDEF(.AREA.,$,#8,{x},{y})")
-        solid = self.add(f"IFCEXTRUDEDAREASOLID({profile},#4,#9,{z})")
-        if transparency is not None:
-            colour = self.add("IFCCOLOURRGB($,0.5,0.6,0.7)")
-            through = f"{colour},{transparency:.4f},$,$,$,$,$,$,.NOTDEFINED."
-            style = self.add(f"IFCSURFACESTYLERENDERING({through})")
-            style = self.add(f"IFCSURFACESTYLE('paint',.BOTH.,({style}))")
-            if self.schema.upper().startswith("IFC2"):
-                style = self.add(f"IFCPRESENTATIONSTYLEASSIGNMENT(({style}))")
-            self.add(f"IFCSTYLEDITEM({solid},({style}),$)")
-        return solid
-
-    def shape(self, size: tuple, *transparencies: float | None) -> str:
-        """A representation of boxes side by side, one for each transparency, or a single one without a colour."""
-        solids = ",".join(self.solid(size, transparency) for transparency in transparencies or (None,))
-        return self.add(f"IFCSHAPEREPRESENTATION(#5,'Body','SweptSolid',({solids}))")
-
-    def box(self, kind: str, name: str, middle: tuple, size: tuple, more: str = ",$", paint: tuple = ()) -> str:
-        """A product whose box stands on `middle`."""
-        shape = self.add(f"IFCPRODUCTDEFINITIONSHAPE($,$,({self.shape(size, *paint)}))")
-        point = self.add("IFCCARTESIANPOINT((" + ",".join(str(float(x)) for x in middle) + "))")
-        place = self.add(f"IFCLOCALPLACEMENT($,{self.add(f'IFCAXIS2PLACEMENT3D({point},$,$)')})")
-        name = name if name == "*" else f"'{name}'"
-        return self.add(f"{kind.upper()}('{len(self.lines):022d}',$,{name},$,$,{place},{shape}{more})")
-
-    def relate(self, kind: str, one: str, other: str) -> None:
-        self.add(f"{kind.upper()}('{len(self.lines):022d}',$,$,$,{one},{other})")
-
-    def write(self, path: Path) -> Path:
-        head = "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
-        head += f"FILE_SCHEMA(('{self.schema}'));\nENDSEC;\nDATA;\n"
-        path.write_text(head + "\n".join(self.lines) + "\nENDSEC;\nEND-ISO-10303-21;\n")
-        return path
-
-
-def house(schema: str = "IFC2X3", wall_name: str = "wall") -> Step:
-    """A wall of 4 x 0.2 x 3 m with a door, a room, a slab and two chairs, 500 km from the origin."""
-    far = np.array([500_000_000.0, 0.0, 0.0])
-    step = Step(schema)
-    wall = step.box("IfcWallStandardCase", wall_name, far, (4000, 200, 3000))
-    void = step.box("IfcOpeningElement", "void", far, (1000, 300, 2000))
-    door = step.box("IfcDoor", "door", far, (900, 50, 1900), ",$,$,$")
-    step.relate("IfcRelVoidsElement", wall, void)
-    step.relate("IfcRelFillsElement", void, door)
-    step.box("IfcSpace", "room", far + np.array([0, 2000, 0]), (4000, 3800, 3000), ",$,.ELEMENT.,.INTERNAL.,$")
-    step.box("IfcSlab", "slab", far + np.array([0, 2000, -300]), (4000, 4200, 300), ",$,.FLOOR.")
-    step.box("IfcFurnishingElement", "chair", far + np.array([1000, 2000, 0]), (500, 500, 900))
-    return step
 
 
 PAINTS = {
@@ -305,3 +238,256 @@ def test_shared_geometry_is_one_definition(tmp_path):
     low = scene.object_bounds()[stools, 0, 0] * scene.grid_m
     assert abs(low[1] - low[0]) == pytest.approx(0.7, abs=GRID_M)
     assert low.min() + scene.origin[0] == pytest.approx(500_000.75, abs=GRID_M)
+
+
+MIDDLE = ("mid low", "mid high", "mid lintel")
+LIKE_BASE = ("base", "dup_guid", "mirrored", "maporigin", "norepitems", "stray_near", "space_box")
+
+
+@pytest.mark.parametrize("name", LIKE_BASE)
+def test_awkward_files_are_the_house(name):
+    scene = read(ifc_case(name))
+    assert_house(scene)
+    assert len(scene.objects) == 12 + (name == "stray_near")
+    assert sorted(space.name for space in scene.spaces) == ["east", "west"]
+    roles = Counter(placed.role for placed in scene.objects)
+    assert roles == {Role.OCCLUDER: 9 + (name == "stray_near"), Role.DETAIL: 3}
+
+
+def test_scaled_copies_are_where_they_are_written():
+    scene = read(ifc_case("nonuniform"))
+    assert_house(scene)
+    assert len(scene.objects) == 12
+
+
+def test_two_bodies_are_one_wall():
+    """The whole wall every time: the pieces came in any order, and the last to come was all of it."""
+    scene = read(ifc_case("two_bodies"))
+    assert_house(scene, but=("mid low", "mid high"))
+    np.testing.assert_allclose(boxes(scene)["mid"], [(3.75, 0, 0), (4, 4, 3)], atol=GRID_M)
+    assert scene.triangle_counts[[placed.name for placed in scene.objects].index("mid")] == 24
+
+
+def test_two_bodies_of_a_room_are_one_room(tmp_path):
+    step = house()
+    pieces = [step.shape((1000, 1000, height)) for height in (1000, 2500)]
+    shape = step.add(f"IFCPRODUCTDEFINITIONSHAPE($,$,({','.join(pieces)}))")
+    step.add(f"IFCSPACE('{len(step.lines):022d}',$,'two',$,$,$,{shape},$,.ELEMENT.,.INTERNAL.,$)")
+    (room,) = (space for space in read(step.write(tmp_path / "a.ifc")).spaces if space.name == "two")
+    assert len(room.faces) == 24 and np.ptp(room.vertices, axis=0)[2] == pytest.approx(2.5)
+
+
+def test_products_with_one_guid_are_told_apart_and_noted():
+    scene = read(ifc_case("dup_guid"))
+    assert len({placed.guid for placed in scene.objects}) == 11
+    (note,) = scene.notes
+    assert "mid low" in note["why"] and "mid high" in note["why"] and note["what"].startswith("GlobalId ")
+
+
+def test_a_clearance_is_no_body():
+    scene = read(ifc_case("clearance_only"))
+    assert_house(scene, but=("box c",))
+    (lost,) = scene.skipped
+    assert len(scene.objects) == 11 and "Clearance" in lost["why"] and lost["what"].startswith("IfcFurniture")
+
+
+NO_BODIES = {"Clearance": "SweptSolid", "Box": "BoundingBox", "Reference": "SweptSolid", "Axis": "Curve3D"}
+
+
+@pytest.mark.parametrize("identifier", NO_BODIES)
+@pytest.mark.parametrize("beside", [True, False])
+def test_only_bodies_become_objects(tmp_path, identifier, beside):
+    """Beside a body another representation adds nothing; without one the product is listed, and why."""
+    step = house()
+    solid = step.solid((500, 500, 4000))
+    other = step.add(f"IFCSHAPEREPRESENTATION(#5,'{identifier}','{NO_BODIES[identifier]}',({solid}))")
+    body = f"{step.shape((500, 500, 900))}," if beside else ""
+    shape = step.add(f"IFCPRODUCTDEFINITIONSHAPE($,$,({body}{other}))")
+    point = step.add("IFCCARTESIANPOINT((500001000.,1000.,0.))")
+    place = step.add(f"IFCLOCALPLACEMENT($,{step.add(f'IFCAXIS2PLACEMENT3D({point},$,$)')})")
+    step.add(f"IFCFURNISHINGELEMENT('{len(step.lines):022d}',$,'more',$,$,{place},{shape},$)")
+    scene = read(step.write(tmp_path / "a.ifc"))
+    if beside:
+        assert scene.skipped == [] and np.ptp(boxes(scene)["more"], axis=0)[2] == pytest.approx(0.9, abs=2 * GRID_M)
+    else:
+        (lost,) = scene.skipped
+        assert identifier in lost["why"] and "more" not in boxes(scene)
+
+
+def test_what_has_no_items_is_listed_and_harms_nothing_else():
+    (lost,) = read(ifc_case("norepitems")).skipped
+    assert lost["what"].startswith("IfcSlab") and "no items" in lost["why"]
+
+
+def test_a_copy_of_nothing_harms_nothing_else(tmp_path):
+    step = house()
+    empty = step.add("IFCSHAPEREPRESENTATION(#5,'Body','',$)")
+    copied = step.add(f"IFCREPRESENTATIONMAP(#4,{empty})")
+    item = step.add(f"IFCMAPPEDITEM({copied},{step.add('IFCCARTESIANTRANSFORMATIONOPERATOR3D($,$,#3,$,$)')})")
+    body = step.add(f"IFCSHAPEREPRESENTATION(#5,'Body','MappedRepresentation',({item}))")
+    shape = step.add(f"IFCPRODUCTDEFINITIONSHAPE($,$,({body}))")
+    step.add(f"IFCFURNISHINGELEMENT('{len(step.lines):022d}',$,'none',$,$,$,{shape},$)")
+    scene = read(step.write(tmp_path / "a.ifc"))
+    (lost,) = scene.skipped
+    assert len(scene.objects) == 4 and len(scene.spaces) == 1 and "no items" in lost["why"]
+
+
+def test_a_file_that_ends_early_is_one_line():
+    assert "cut.ifc" in refused(ifc_case("cut"))
+
+
+def test_a_file_without_a_project_is_one_line():
+    assert "IfcProject" in refused(ifc_case("noproject"))
+
+
+@pytest.mark.parametrize("name", ["glass_style", "glass_material", "glass_layers", "glass_name"])
+def test_glass_by_whatever_the_file_says(name):
+    scene = read(ifc_case(name))
+    (pane,) = (placed for placed in scene.objects if "artition" in placed.name)
+    assert_house(scene)
+    assert pane.role is Role.TRANSPARENT and pane.why.startswith("glass: ")
+    assert sum(placed.role is Role.OCCLUDER for placed in scene.objects) == 9
+
+
+def test_rooms_by_their_boxes_and_rooms_without_any():
+    scene = read(ifc_case("space_box"))
+    (lost,) = scene.skipped
+    assert "'west'" in lost["what"] and "Box" in lost["why"] and scene.lost_rooms == [lost["what"]]
+    (west,) = (space for space in scene.spaces if space.name == "west")
+    np.testing.assert_allclose(np.ptp(west.vertices, axis=0), (3.75, 4, 3))
+    np.testing.assert_allclose(west.vertices.min(axis=0) + scene.origin, (0, 0, 0))
+    half, none = read(ifc_case("space_half")), read(ifc_case("space_nogeo"))
+    assert [space.name for space in half.spaces] == ["west"] and none.spaces == []
+    assert [len(scene.lost_rooms) for scene in (half, none)] == [1, 2]
+    assert all("no representation" in lost["why"] for lost in half.skipped + none.skipped)
+
+
+def test_a_stray_is_named_and_left_out_as_asked():
+    message = refused(ifc_case("stray"))
+    assert "survey point" in message and "--leave-out" in message and "wall" not in message
+    scene = read(ifc_case("stray"), leave_out="survey point")
+    assert_house(scene, shift=(2_600_000, 1_200_000, 400))
+    assert [lost["what"] for lost in scene.skipped] == ["survey point"]
+    (note,) = read(ifc_case("stray_near")).notes
+    assert "survey point" in note["what"]
+
+
+def test_far_is_the_house():
+    assert_house(read(ifc_case("far")), shift=(2_600_000.25, 1_200_000.5, 400.125))
+
+
+@pytest.mark.parametrize(("name", "angle_deg"), [("rotated", 30), ("far_rotated", 33)])
+def test_turned_is_the_house_turned_and_noted(name, angle_deg):
+    scene = read(ifc_case(name))
+    cos, sin = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    back = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+    far = (2_600_000, 1_200_000, 400) if name == "far_rotated" else (0, 0, 0)
+    for placed in scene.objects:
+        mesh = scene.definitions[placed.definition_id].lods[0]
+        points = (mesh.vertices @ placed.transform[:3, :3].T + placed.transform[:3, 3] + scene.origin - far) @ back.T
+        found = [points.min(axis=0), points.max(axis=0)]
+        np.testing.assert_allclose(found, HOUSE[placed.name], atol=1e-3, err_msg=placed.name)
+    assert len(scene.objects) == 12 and len(scene.spaces) == 2
+    assert f"{angle_deg}.00 degrees" in scene.notes[-1]["why"]
+
+
+def test_parts_of_a_wall_are_wall():
+    scene = read(ifc_case("parts_void"))
+    assert_house(scene, but=MIDDLE)
+    layers = [placed for placed in scene.objects if placed.name.startswith("layer")]
+    assert [layer.role for layer in layers] == [Role.OCCLUDER] * 2
+    assert all((scene.triangles()[1] == scene.objects.index(layer)).sum() > 12 for layer in layers)  # the hole is cut
+
+
+def test_parts_of_furniture_are_detail(tmp_path):
+    step = house("IFC4")
+    part = step.box("IfcBuildingElementPart", "top", (500_001_000.0, 2000, 0), (500, 500, 900), ",$,$")
+    desk = step.add(f"IFCFURNITURE('{len(step.lines):022d}',$,'desk',$,$,$,$,$,$)")
+    step.relate("IfcRelAggregates", desk, f"({part})")
+    assert by_name(read(step.write(tmp_path / "a.ifc")))["top"][1] is Role.DETAIL
+
+
+def test_feet_are_feet(tmp_path):
+    """By a unit that is converted, whose name means nothing to us."""
+    step = house()
+    factor = step.add("IFCMEASUREWITHUNIT(IFCLENGTHMEASURE(0.3048),#1)")
+    size = step.add("IFCDIMENSIONALEXPONENTS(1,0,0,0,0,0,0)")
+    step.lines[0] = "#1=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);"
+    foot = step.add(f"IFCCONVERSIONBASEDUNIT({size},.LENGTHUNIT.,'FOOT',{factor})")
+    step.lines[1] = f"#2=IFCUNITASSIGNMENT(({foot}));"
+    text = step.write(tmp_path / "a.ifc").read_text().replace("50000", "")
+    (tmp_path / "a.ifc").write_text(text)
+    scene = read(tmp_path / "a.ifc", grid_m=1.0)
+    assert scene.unit == "foot"
+    np.testing.assert_allclose(np.ptp(boxes(scene)["wall"], axis=0), np.array([4000, 200, 3000]) * 0.3048, atol=2)
+
+
+def test_faces_have_the_colour_of_their_style(tmp_path):
+    step = house()
+    far = (500_000_000.0, 9000, 0)
+    step.box("IfcColumn", "half", far, (600, 600, 3000), ",$", (0.8, None))
+    scene = read(step.write(tmp_path / "a.ifc"))
+    colours = {placed.name: scene.definitions[placed.definition_id].lods[0].colours for placed in scene.objects}
+    assert colours["wall"] is None
+    assert colours["half"].dtype == np.uint8 and colours["half"].shape == (24, 4)
+    assert {tuple(row) for row in colours["half"].tolist()} == {(128, 153, 178, 51), (179, 179, 179, 255)}
+
+
+SAME = """
+import os, sys
+os.cpu_count = lambda: int(sys.argv[1])
+from viewcell.data.readers import read
+for path in sys.argv[2:]:
+    scene = read(path)
+    print(scene.sha256, [(o.name, o.guid, o.kind, o.role.value, o.definition_id) for o in scene.objects])
+    print(scene.object_bounds().tolist(), scene.triangles()[0].sum(axis=(1, 2)).tolist(), scene.skipped, scene.notes)
+    print([(s.name, s.vertices.tolist()) for s in scene.spaces], scene.openings.tolist())
+"""
+
+
+def test_two_processes_read_the_same():
+    """Whatever the seed of hashes and the number of threads."""
+    paths = [str(ifc_case(name)) for name in ("two_bodies", "dup_guid", "parts_void", "norepitems", "space_half")]
+    read_by = [
+        subprocess.run(
+            [sys.executable, "-c", SAME, threads, *paths],
+            env=os.environ | {"PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed, threads in (("1", "1"), ("2", "4"))
+    ]
+    assert read_by[0] == read_by[1] and read_by[0].count("\n") == 3 * len(paths)
+
+
+def test_what_is_no_thing_is_counted(tmp_path):
+    step = house("IFC4")
+    step.box("IfcSpatialZone", "zone", (500_000_000.0, 2000, 0), (500, 500, 900), ",$,$")
+    scene = read(step.write(tmp_path / "a.ifc"))
+    assert [lost["what"] for lost in scene.skipped] == ["1 IfcSpatialZone"] and "zone" not in boxes(scene)
+
+
+def test_an_archive_with_one_file_is_read(tmp_path):
+    path = tmp_path / "a.ifczip"
+    with ZipFile(path, "w") as archive:
+        archive.write(house().write(tmp_path / "a.ifc"), "inside/a.IFC")
+        archive.writestr("readme.txt", "not this")
+    assert by_name(read(path)) == by_name(read(tmp_path / "a.ifc"))
+
+
+SEEDS = [*range(25), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(25, 500))]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_damaged_file_is_a_scene_or_one_line(tmp_path, seed):
+    """Of two files: of the house most accidents are refused, of a file of few words many are not."""
+    for number, path in enumerate((ifc_case("base"), house().write(tmp_path / "sound.ifc"))):
+        damaged = tmp_path / f"{number}.ifc"
+        damaged.write_bytes(mutated(path.read_bytes(), seed))
+        try:
+            scene = read(damaged)
+        except InputError as error:
+            assert "\n" not in str(error)
+        else:
+            assert scene.objects
