@@ -23,6 +23,8 @@ METRES = {
 }
 # An area that vanishes [m2].
 NO_AREA = 1e-9
+# Share of the height between two corners by which the sweep keeps off them.
+SLIVER = 1e-6
 
 
 def differences_gbxml(scene: Scene, path: Path) -> list[str]:
@@ -73,9 +75,9 @@ def _things(root: ElementTree.Element, metres: float) -> Iterator[Found]:
             holes.append(ring)
             if opening.get("openingType") != "Air" and np.linalg.norm(_newell(ring)) > NO_AREA:
                 yield Found(opening.get("id"), _box(ring), float(np.linalg.norm(_newell(ring))))
-        area = _left(outer, holes) if len(outer) > 2 else 0.0
+        area, box = _left(outer, holes) if len(outer) > 2 else (0.0, _box(outer))
         if surface.get("surfaceType") != "Air" and area > NO_AREA:
-            yield Found(surface.get("id"), _box(outer), area)
+            yield Found(surface.get("id"), box, area)
 
 
 def _corners(owner: ElementTree.Element, metres: float) -> np.ndarray:
@@ -97,18 +99,24 @@ def _newell(ring: np.ndarray) -> np.ndarray:
     return normal / 2
 
 
-def _left(outer: np.ndarray, holes: list[np.ndarray]) -> float:
-    """Area of a polygon that its holes leave [m2], whether or not they overlap or reach beyond it."""
+def _left(outer: np.ndarray, holes: list[np.ndarray]) -> tuple[float, np.ndarray]:
+    """Area [m2] and box [m] of what holes leave of a polygon, whether or not they overlap or reach beyond it."""
     normal = _newell(outer)
     area = float(np.linalg.norm(normal))
     if not holes or area == 0:
-        return area
+        return area, _box(outer)
     # Its shadow along an axis is smaller by the share of the normal that lies along it.
     axis = int(np.abs(normal).argmax())
     flat = [np.delete(ring, axis, axis=1) for ring in (outer, *holes)]
     levels = sorted({y for ring in flat for y in ring[:, 1]} | set(_meetings(flat)))
-    shadow = sum((high - low) * _length(flat, (low + high) / 2) for low, high in pairwise(levels))
-    return shadow * area / abs(normal[axis])
+    shadow, ends = 0.0, []
+    for low, high in pairwise(levels):
+        shadow += (high - low) * sum(b - a for a, b in _pieces(flat, (low + high) / 2))
+        inset = SLIVER * (high - low)
+        ends += [(x, y) for y in (low + inset, high - inset) for piece in _pieces(flat, y) for x in piece]
+    points = np.insert(np.array(ends).reshape(-1, 2), axis, 0.0, axis=1)
+    points[:, axis] = (outer.mean(axis=0) @ normal - points @ normal) / normal[axis]
+    return shadow * area / abs(normal[axis]), _box(points) if len(points) else _box(outer)
 
 
 def _meetings(rings: list[np.ndarray]) -> Iterator[float]:
@@ -125,16 +133,13 @@ def _meetings(rings: list[np.ndarray]) -> Iterator[float]:
                     yield float(a[1] + share * uy)
 
 
-def _length(rings: list[np.ndarray], y: float) -> float:
-    """Length of the line at height y that lies in the first ring and in no other."""
+def _pieces(rings: list[np.ndarray], y: float) -> Iterator[tuple[float, float]]:
+    """Pieces of the line at height y that lie in the first ring and in no other."""
     ends = [sorted(_ends(ring, y)) for ring in rings]
-    marks = sorted(x for found in ends for x in found)
-    length = 0.0
-    for a, b in pairwise(marks):
-        middle = (a + b) / 2
-        inside = [sum(x < middle for x in found) % 2 for found in ends]
-        length += (b - a) * (inside[0] and not any(inside[1:]))
-    return length
+    for a, b in pairwise(sorted(x for found in ends for x in found)):
+        inside = [sum(x < (a + b) / 2 for x in found) % 2 for found in ends]
+        if a < b and inside[0] and not any(inside[1:]):
+            yield a, b
 
 
 def _ends(ring: np.ndarray, y: float) -> Iterator[float]:

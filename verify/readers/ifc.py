@@ -47,7 +47,8 @@ def found_ifc(path: Path, rooms: bool = False) -> Iterator[Found]:
     Raises:
         InputError: the file cannot be opened.
     """
-    for product in _open(path).by_type("IfcProduct"):
+    ifc = _open(path)  # its products do not keep it alive
+    for product in ifc.by_type("IfcProduct"):
         if product.is_a("IfcSpace") != rooms:
             continue
         if rooms or product.is_a("IfcSite") or not any(map(product.is_a, NO_THINGS)):
