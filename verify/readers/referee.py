@@ -8,7 +8,8 @@ import numpy as np
 
 from ...data.scene import Scene
 
-# Shares of an area, and of the largest coordinate, that float32 and sums in another order may be off by.
+# Shares of an area, and of the largest distance from the scene's origin, that float32 and sums in another order may be
+# off by.
 AREA_SHARE, REACH_SHARE = 1.0e-4, 2.0**-22
 
 
@@ -44,7 +45,7 @@ def differences(scene: Scene, found: Iterable[Found]) -> list[str]:
         if len(a) != len(b):
             lines.append(f"{key!r}: expected {_count(b)} as a second reader finds, found {_count(a)}")
             continue
-        lines += [line for one, other in zip(a, b, strict=True) if (line := _difference(scene.grid_m, one, other))]
+        lines += [line for one, other in zip(a, b, strict=True) if (line := _difference(scene, one, other))]
     return lines
 
 
@@ -52,8 +53,9 @@ def _count(found: list[Found]) -> str:
     return f"{len(found)} object{'s' * (len(found) != 1)}"
 
 
-def _difference(grid_m: float, ours: Found, theirs: Found) -> str:
-    slack = grid_m + REACH_SHARE * np.abs(theirs.box).max()
+def _difference(scene: Scene, ours: Found, theirs: Found) -> str:
+    # From the scene's origin, not the file's: what is far from that is no less exact.
+    slack = scene.grid_m + REACH_SHARE * np.abs(theirs.box - scene.origin).max()
     apart = np.abs(ours.box - theirs.box).max()
     if not apart <= slack:
         return f"{ours.key!r}: expected the box {_text(theirs.box)}, found {_text(ours.box)}"
