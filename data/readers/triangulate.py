@@ -1,6 +1,5 @@
 """Polygons to triangles."""
 
-import itertools
 from collections.abc import Sequence
 
 import mapbox_earcut
@@ -8,12 +7,10 @@ import numpy as np
 
 # A polygon whose corners lie further from their common plane than this share of its size is bent.
 BENT_SHARE = 1.0e-4
-# A corner is on an edge if it is no further off than this share of its length: float64 leaves no more.
-IN_LINE = 1.0e-12
 
 
 def polygon_triangles(vertices: Sequence, corners: Sequence[int]) -> list[tuple[int, int, int]]:
-    """Triangles of a simple, flat polygon, which turn the way it turns and use every corner.
+    """Triangles of a simple, flat polygon, which turn the way it turns; spikes add none.
 
     A polygon that is neither simple nor flat still gets triangles, none outside its outline as seen along its normal.
 
@@ -112,48 +109,7 @@ def _ears(points: np.ndarray) -> list[tuple[int, int, int]]:
     if not len(found):
         return fan
     triangles = np.array(ring)[found.reshape(-1, 3).astype(np.int64)]
-    return _with_all_corners([tuple(map(int, one)) for one in triangles], ring, flat)
-
-
-def _with_all_corners(
-    triangles: list[tuple[int, int, int]], ring: list[int], flat: np.ndarray
-) -> list[tuple[int, int, int]]:
-    """The triangles, split at corners that lie on their edges: ear cutting leaves out what is in line.
-
-    Without them the rounding to the grid would open gaps to the neighbours that have those corners. Spikes stay out.
-    """
-    used = {k for corners in triangles for k in corners}
-    kept = [place for place, k in enumerate(ring) if k in used]
-    if len(kept) == len(ring):
-        return triangles
-    edges = {edge: place for place, (a, b, c) in enumerate(triangles) for edge in ((a, b), (b, c), (c, a))}
-    for here, there in zip(kept, [*kept[1:], kept[0] + len(ring)], strict=True):
-        a, b = ring[here], ring[there % len(ring)]
-        between = _between([ring[k % len(ring)] for k in range(here + 1, there)], a, b, flat)
-        if not between or (a, b) not in edges:
-            continue
-        place = edges[a, b]
-        third = next(k for k in triangles[place] if k not in (a, b))
-        line = [a, *between, b]
-        triangles[place] = (a, between[0], third)
-        edges[third, a] = place
-        for before, after in itertools.pairwise(line):
-            edges[before, after] = edges[after, third] = len(triangles)
-            triangles.append((before, after, third))
-    return triangles
-
-
-def _between(corners: list[int], a: int, b: int, flat: np.ndarray) -> list[int]:
-    """Those of the corners that lie on the way from a to b, each further on than the one before."""
-    way = flat[b] - flat[a]
-    square, reached, kept = float(way @ way), 0.0, []
-    for k in corners:
-        off = flat[k] - flat[a]
-        along, aside = float(off @ way), float(off[0] * way[1] - off[1] * way[0])
-        if reached < along < square and abs(aside) <= IN_LINE * square:
-            kept.append(k)
-            reached = along
-    return kept
+    return [tuple(map(int, one)) for one in triangles]
 
 
 def _flattened(points: np.ndarray) -> np.ndarray:

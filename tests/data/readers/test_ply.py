@@ -70,7 +70,7 @@ LIES = {
     "faces without end": ("ascii", HEAD, "3 0 1 2\n", "element face 4000000000"),
     "a vertex that is not there": ("ascii", HEAD, "3 0 1 8\n"),
     "a negative vertex": ("ascii", HEAD, "3 0 1 -1\n"),
-    "a corner between two": ("ascii", HEAD, "3 0 1 1.5\n"),
+    "a corner between two": ("ascii", HEAD, "3 0 1 2.5\n"),
     "more corners than words": ("ascii", HEAD, "9 0 1 2\n"),
     "a negative count": ("ascii", HEAD, "-3 0 1 2\n"),
     "a word": ("ascii", HEAD, "3 0 1 two\n"),
