@@ -1,23 +1,36 @@
-"""The second reader of each format."""
+"""A model file by the second reader of its format, against the scene that was read from it."""
 
-from collections.abc import Iterable
 from pathlib import Path
 
 from ...data.errors import InputError
 from ...data.scene import Scene
-from .referee import Found
+from .gbxml import differences_gbxml
+from .ifc import differences_ifc
+from .meshes import SECOND_READERS, found_in_mesh
+from .referee import differences
 
-SUFFIXES = (".ifc", ".ifczip", ".xml", ".gbxml", ".gltf", ".glb", ".obj", ".ply", ".stl")
+IFC, GBXML = (".ifc", ".ifczip"), (".xml", ".gbxml")
 
 
-def second_reader(path: Path, scene: Scene) -> Iterable[Found]:
-    """Objects of a model file by the second reader of its format.
+def disagreements(scene: Scene, path: Path, *, metres: float = 1.0, up: str | None = None) -> list[str]:
+    """What a second reader finds otherwise, one line each.
 
     Args:
-        path: the file.
-        scene: what was read from it; tells which unit was meant, and nothing else.
+        scene: what was read.
+        path: the whole file that it was read from.
+        metres: length of a mesh file's unit.
+        up: axis that points up in a mesh file; None for the format's habit.
 
     Raises:
         InputError: its format has no second reader.
     """
-    raise InputError(f"{path}: expected {', '.join(SUFFIXES)} for a second reader, found {path.suffix!r}")
+    suffix = path.suffix.lower()
+    if suffix in IFC:
+        return differences_ifc(scene, path)
+    if suffix in GBXML:
+        return differences_gbxml(scene, path)
+    found = found_in_mesh(path, metres, up)
+    if found is None:
+        known = ", ".join((*IFC, *GBXML, *SECOND_READERS))
+        raise InputError(f"{path}: expected {known} for a second reader, found {suffix!r}")
+    return differences(scene, found)

@@ -55,7 +55,7 @@ def inspect(
         cells=find_cells(prepared, **({} if estimate else {"tried": 0})),
     )
     if referee:
-        found.differences = _differences(model, scene)
+        found.differences = _differences(model, scene, reading)
     found.warnings = warnings(found)
     found.lines = lines(found)
     return found
@@ -96,10 +96,14 @@ def _stray(scene: Scene) -> list[tuple[str, float]]:
     return [(scene.objects[there[i]].name, float(away[i])) for i in order]
 
 
-def _differences(model: Scene | str | Path, scene: Scene) -> list[str]:
+def _differences(model: Scene | str | Path, scene: Scene, reading: "Mapping[str, object]") -> list[str]:
     if isinstance(model, Scene) or Path(model).is_dir():
         raise InputError(f"{scene.source or 'scene'}: expected a model file to read a second time, found a scene")
-    from ...verify.readers.referee import differences
-    from ...verify.readers.second_reader import second_reader
+    if reading.get("leave_out"):
+        raise InputError(f"{model}: expected the whole file to read a second time, found something left out")
+    from ...data.readers.units import metres_per_unit
+    from ...verify.readers.second_reader import disagreements
 
-    return differences(scene, second_reader(Path(model), scene))
+    unit = reading.get("unit")
+    metres = 1.0 if unit is None else metres_per_unit(unit)[0]
+    return disagreements(scene, Path(model), metres=metres, up=reading.get("up"))
