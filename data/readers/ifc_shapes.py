@@ -77,7 +77,7 @@ def _keep(shape: object) -> str:
     """Leave a product's shape its bodies; or say why it has none."""
     every = list(shape.Representations or ())
     bodies = [one for one in every if _is_body(one)]
-    filled = [one for one in bodies if _fill(one)]
+    filled = [one for one in bodies if _is_filled(one)]
     if not filled:
         if bodies:
             return "its body has no items"
@@ -108,18 +108,14 @@ def _plain(text: str | None) -> str:
     return (text or "").strip().lower()
 
 
-def _fill(representation: object) -> bool:
-    """Whether a representation has items; mapped ones that lead to none are taken from it."""
-    items = list(representation.Items or ())
-    filled = [item for item in items if not item.is_a("IfcMappedItem") or _leads_somewhere(item)]
-    if filled and filled != items:
-        representation.Items = filled
-    return bool(filled)
+def _is_filled(representation: object) -> bool:
+    """Whether a representation has an item that is no copy of nothing."""
+    return any(not item.is_a("IfcMappedItem") or _leads_somewhere(item) for item in representation.Items or ())
 
 
 def _leads_somewhere(item: object) -> bool:
     source = item.MappingSource
-    return source is not None and source.MappedRepresentation is not None and _fill(source.MappedRepresentation)
+    return source is not None and source.MappedRepresentation is not None and _is_filled(source.MappedRepresentation)
 
 
 def shapes_of(ifc: object, **selection: list) -> dict[int, Shape]:
@@ -175,7 +171,7 @@ def _shape(pieces: list) -> Shape:
         offset += len(vertices[-1])
     transform = np.array(pieces[0].transformation.matrix, np.float64).reshape(4, 4).T
     painted = np.concatenate(colours)
-    styled = (len(painted) and painted[:, 3].min() >= 0) or (painted[:, 3] >= 0).any()
+    styled = bool((painted[:, 3] >= 0).any())
     levels = [
         piece.geometry.materials[i].transparency for piece in pieces for i in {*piece.geometry.material_ids} if i >= 0
     ]

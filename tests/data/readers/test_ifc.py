@@ -319,17 +319,21 @@ def test_what_has_no_items_is_listed_and_harms_nothing_else():
     assert lost["what"].startswith("IfcSlab") and "no items" in lost["why"]
 
 
-def test_a_copy_of_nothing_harms_nothing_else(tmp_path):
+@pytest.mark.parametrize("beside", [True, False])
+def test_a_copy_of_nothing_harms_nothing_else(tmp_path, beside):
     step = house()
+    solid = f"{step.solid((500, 500, 900))}," if beside else ""
     empty = step.add("IFCSHAPEREPRESENTATION(#5,'Body','',$)")
     copied = step.add(f"IFCREPRESENTATIONMAP(#4,{empty})")
     item = step.add(f"IFCMAPPEDITEM({copied},{step.add('IFCCARTESIANTRANSFORMATIONOPERATOR3D($,$,#3,$,$)')})")
-    body = step.add(f"IFCSHAPEREPRESENTATION(#5,'Body','MappedRepresentation',({item}))")
+    body = step.add(f"IFCSHAPEREPRESENTATION(#5,'Body','MappedRepresentation',({solid}{item}))")
     shape = step.add(f"IFCPRODUCTDEFINITIONSHAPE($,$,({body}))")
-    step.add(f"IFCFURNISHINGELEMENT('{len(step.lines):022d}',$,'none',$,$,$,{shape},$)")
+    point = step.add("IFCCARTESIANPOINT((500001000.,1000.,0.))")
+    place = step.add(f"IFCLOCALPLACEMENT($,{step.add(f'IFCAXIS2PLACEMENT3D({point},$,$)')})")
+    step.add(f"IFCFURNISHINGELEMENT('{len(step.lines):022d}',$,'none',$,$,{place},{shape},$)")
     scene = read(step.write(tmp_path / "a.ifc"))
-    (lost,) = scene.skipped
-    assert len(scene.objects) == 4 and len(scene.spaces) == 1 and "no items" in lost["why"]
+    assert len(scene.objects) == 4 + beside and len(scene.spaces) == 1
+    assert [lost["why"] for lost in scene.skipped] == ([] if beside else ["its body has no items"])
 
 
 def test_a_file_that_ends_early_is_one_line():

@@ -81,6 +81,7 @@ def test_a_lost_and_a_moved_room_are_named(pair):
     scene, path = pair
     (line,) = differences_ifc(replace(scene, spaces=[]), path)
     assert line.startswith("room 'room'")
+    assert len(differences_ifc(replace(scene, objects=scene.objects[1:], spaces=[]), path)) == 2
     (room,) = scene.spaces
     (line,) = differences_ifc(replace(scene, spaces=[replace(room, vertices=room.vertices + 1)]), path)
     assert "box" in line
