@@ -373,9 +373,15 @@ def test_a_cell_belongs_to_a_room_that_holds_more_than_half_of_it(axis):
     rooms = [rooms[1], rooms[2], (low, halfway), (np.where(np.arange(3) == axis, halfway, low), high + 1)]
     cells.append(np.array(cells[1]) + 40 * METRE)
     rooms.append((cells[-1][0] - 500, np.where(np.arange(3) == axis, cells[-1][0] + METRE, cells[-1][1] + 500)))
+    # A room that holds half of no cell names the one that holds most of it; these hold another one whole.
+    for room in (0, -1):
+        low, high = rooms[room]
+        before = np.where(np.arange(3) == axis, low - 6 * METRE, low)
+        cells.append([before + 1000, np.where(np.arange(3) == axis, low - METRE, high - 1000)])
+        rooms[room] = before, high
     found = find_inhabitable(room_scene(rooms=rooms), bare_graph(cells))
-    np.testing.assert_array_equal(found.mask, [True, False, True, False])
-    assert found.names.tolist()[1:] == ["", "room 1", ""] and found.names[0] in ("room 2", "room 3")
+    np.testing.assert_array_equal(found.mask, [True, False, True, False, True, True])
+    assert found.names.tolist() == ["room 2, room 3", "", "room 1", "", "room 0", "room 4"]
 
 
 def test_a_room_that_is_no_box_holds_what_is_inside_it():
