@@ -196,7 +196,7 @@ def _taken(product: object, shape: Shape, roles: RoleRules, metres: float) -> Ta
     """What a product is taken for; a part of a wall or slab that has layers is what the whole is."""
     whole = _whole(product)
     as_what = whole if whole is not None and product.is_a("IfcBuildingElementPart") else product
-    glazed = "glass: a surface style lets light pass" if shape.glazed else glass_material(product, roles, metres)
+    glazed = "glass: a surface style that lets light pass" if shape.glazed else glass_material(product, roles, metres)
     if not glazed and as_what is not product and not associations(product):
         glazed = glass_material(as_what, roles, metres)
     names = (product.Name, getattr(product, "ObjectType", None), getattr(type_of(product), "Name", None))

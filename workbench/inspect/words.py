@@ -13,6 +13,8 @@ WIDTH, INDENT = 112, 14
 KINDS_SHOWN, TOLD_SHOWN, SKIPPED_SHOWN, NAMED = 5, 4, 3, 2
 # Shares of upright faces off the main axes, and of opaque objects that are open, that are worth a word.
 TURNED_SHARE, OPEN_SHARE = 0.1, 0.05
+# A building that is so much lower along y than otherwise may lie on its side.
+LYING_SHARE = 0.5
 # A building larger than this, or smaller than that [m], is likely in another unit.
 LARGE_M, SMALL_M = 5000.0, 0.5
 
@@ -119,10 +121,8 @@ def _surfaces(found: Inspection) -> str:
 
 def _doubled(found: Inspection) -> str:
     faces = found.surfaces
-    parts = [
-        f"{faces.repeated:,} triangles in one object",
-        f"{sum(len(ids) - 1 for ids in faces.twins):,} whole objects",
-    ]
+    copies = sum(len(ids) - 1 for ids in faces.twins)
+    parts = [f"{counted(faces.repeated, 'triangle')} within an object", counted(copies, "whole object")]
     if faces.overlaps is None:
         parts.append("coplanar faces not looked for in so large a model")
     else:
@@ -185,6 +185,12 @@ def _reading(found: Inspection) -> Iterator[Words]:
             f"{counted(len(lost), 'part')} of the file not in the model: {lost[0]['what']}",
             "what is missing hides nothing, so more is called visible; it is never drawn",
             "look at all with --json, and mend those that should be walls",
+        )
+    if found.unit_because.startswith("assumed") and found.size_m[1] < LYING_SHARE * min(found.size_m[[0, 2]]):
+        yield (
+            "the model is lowest along y, as if y pointed up",
+            "floors are taken for walls: where one can stand, storeys and plans are wrong",
+            "if it lies on its side: --up y",
         )
     if max(found.size_m) > LARGE_M or max(found.size_m) < SMALL_M:
         yield (

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 from builders import random_solids
+from viewcell.data import readers
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.store.scene_folder import write_scene
@@ -50,6 +51,30 @@ def test_what_lies_far_away_is_named():
     scene.objects += far.objects
     (stray,) = [warning for warning in inspect(scene, estimate=False).warnings if "far from" in warning.what]
     assert "survey point" in stray.what and "--leave-out" in stray.do
+
+
+def moved(scene):
+    scene.origin[0] += 1.0
+    return scene
+
+
+def test_what_lies_on_its_side_is_told(tmp_path):
+    box = random_solids.box([0, 0, 0], [20, 6, 30])
+    (tmp_path / "side.obj").write_bytes(box.export(file_type="obj").encode())
+    for up, told in ((None, True), ("y", False)):
+        found = inspect(tmp_path / "side.obj", estimate=False, up=up)
+        assert any("--up y" in warning.do for warning in found.warnings) == told
+
+
+def test_the_second_reader_is_heard(tmp_path, monkeypatch, capsys):
+    (tmp_path / "box.obj").write_bytes(random_solids.box([0, 0, 0], [4, 4, 4]).export(file_type="obj").encode())
+    arguments = ["inspect", str(tmp_path / "box.obj"), "--referee", "--no-estimate", "--unit", "foot"]
+    assert main(arguments) == 0 and "agrees" in capsys.readouterr().out
+    # The first reader goes wrong by a metre.
+    read = readers.read
+    monkeypatch.setattr(readers, "read", lambda *path, **options: moved(read(*path, **options)))
+    assert main(arguments) == 1
+    assert "1 difference" in (said := capsys.readouterr().out) and "not fit to bake" in said
 
 
 def test_the_command(tmp_path, capsys):
