@@ -108,6 +108,7 @@ class Scene:
         spaces: room volumes, possibly none.
         openings: boxes of doors, windows and voids [m], shape (n, 2, 3), float64: shut to find rooms by flooding.
         origin: whole metres subtracted from the model's coordinates, float64 x 3.
+        yaw_deg: the model is then turned back by this about the vertical [degrees, counter-clockwise]; see `in_model`.
         grid_m: grid step [m].
         source: path of the model as given, or the generator's command.
         sha256: of the source file; empty for generated scenes.
@@ -121,6 +122,7 @@ class Scene:
     spaces: list[Space] = field(default_factory=list)
     openings: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    yaw_deg: float = 0.0
     grid_m: float = GRID_M
     source: str = ""
     sha256: str = ""
@@ -132,6 +134,11 @@ class Scene:
     def lost_rooms(self) -> list[str]:
         """Rooms that the model names but gives no body, as listed in `skipped`."""
         return [lost["what"] for lost in self.skipped if lost["what"].startswith(LOST_ROOM)]
+
+    def in_model(self, points: np.ndarray) -> np.ndarray:
+        """Points of the scene's frame [m] in the model's own, shape (..., 3), float64."""
+        cos, sin = np.cos(np.radians(self.yaw_deg)), np.sin(np.radians(self.yaw_deg))
+        return points @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) + self.origin
 
     def world_vertices(self, object_id: int, lod: int = 0) -> np.ndarray:
         """Snapped world vertices of one object [grid steps], shape (n, 3), int32.

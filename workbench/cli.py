@@ -189,6 +189,9 @@ def _add_numbers(parser: argparse.ArgumentParser) -> None:
 def _add_roles(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     """What the parts of a model file do to sight."""
     parser.add_argument("--doors", choices=["open", "closed"], help="whether doors occlude; open by default")
+    parser.add_argument(
+        "--yaw", metavar="DEG", help="turn the model back by so much, or auto: until walls stand along axes"
+    )
     for option, text in (
         ("--glass", "regular expression for names and materials of glass, in place of the words for it"),
         ("--doors-by", "regular expression for names of doors, in place of the words for them"),

@@ -99,7 +99,7 @@ def bake(options: argparse.Namespace) -> int:
     out = Path(options.out) if options.out else default_out(model)
     before = _stamp(out)
     made = compute(
-        _read(model, options, settings.reading),
+        _read(model, options, settings.reading | settings.frame),
         out,
         settings=settings,
         budget_s=options.budget,
@@ -116,7 +116,7 @@ def bake(options: argparse.Namespace) -> int:
     return 0
 
 
-def _read(model: Path, options: argparse.Namespace, reading: dict[str, str]) -> object:
+def _read(model: Path, options: argparse.Namespace, reading: dict[str, object]) -> object:
     """The model as `bake` takes it: a scene where options say how to read the numbers of the file, else its path."""
     if options.up is None and options.unit is None:
         return model
@@ -130,8 +130,16 @@ def _read(model: Path, options: argparse.Namespace, reading: dict[str, str]) -> 
 def _reading(options: argparse.Namespace) -> dict[str, object]:
     """Options of `read` that were given."""
     asked = {name: getattr(options, name) for name in ("up", "doors", "glass", "doors_by", "leave_out")}
-    asked["unit"] = _unit(options.unit)
+    asked["unit"], asked["yaw"] = _unit(options.unit), _yaw(options.yaw)
     return {name: value for name, value in asked.items() if value is not None}
+
+
+def _yaw(text: str | None) -> str | float | None:
+    """Degrees, or what `read` takes instead."""
+    try:
+        return text if text is None else float(text)
+    except ValueError:
+        return text
 
 
 def _unit(text: str | None) -> str | float | None:

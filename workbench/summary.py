@@ -19,6 +19,10 @@ def summary(bake: "BakeFolder") -> str:
         f"{counts['cells']:,} cells, {counts['inhabitable']:,} inhabitable ({because})",
         f"{counts['portals']:,} portals, {counts['objects']:,} objects",
     ]
+    if facts.get("yaw_deg"):
+        lines.append(
+            f"turned back by {facts['yaw_deg']:g} degrees, so that most walls stand along the axes (--yaw 0: not)"
+        )
     leak = facts.get("leak_cells") or []
     if leak:
         shown = ", ".join(str(cell) for cell in leak[:LEAK_SHOWN]) + (", ..." if len(leak) > LEAK_SHOWN else "")

@@ -23,6 +23,7 @@ def read(
     glass: str = "",
     doors_by: str = "",
     leave_out: str = "",
+    yaw: str | float = 0.0,
     grid_m: float = GRID_M,
 ) -> Scene:
     """The model in a file or scene folder, as a scene ready to bake.
@@ -37,6 +38,8 @@ def read(
         glass: regular expression in place of the words for glass and windows in names; see `RoleRules`.
         doors_by: in place of the words for doors.
         leave_out: parts whose name, GUID or kind it finds are not read.
+        yaw: what the model is turned back by about the vertical [degrees], or "auto" for the angle at which most of its
+            walls stand; see `Scene.in_model`.
         grid_m: grid step [m].
 
     Raises:
@@ -47,6 +50,8 @@ def read(
     roles = RoleRules(doors, glass, doors_by, leave_out)
     if up not in UP_CHOICES:
         raise InputError(f"up: expected y or z, found {up!r}")
+    if yaw != "auto" and not (isinstance(yaw, int | float) and abs(yaw) <= 360.0):
+        raise InputError(f"yaw: expected auto or degrees up to 360, found {yaw!r}")
     if not 0.0 < grid_m < float("inf"):
         raise InputError(f"grid step: expected a positive length in metres, found {grid_m!r}")
     if path.is_dir():
@@ -58,7 +63,7 @@ def read(
     known = IFC_SUFFIXES + GBXML_SUFFIXES + MESH_SUFFIXES
     if suffix not in known:
         raise InputError(f"{path}: expected {', '.join(known)} or a folder, found {suffix!r}")
-    model = Model(source=str(path), sha256=_sha256(path), unit="metre", grid_m=grid_m)
+    model = Model(source=str(path), sha256=_sha256(path), unit="metre", grid_m=grid_m, yaw=yaw)
     if suffix in IFC_SUFFIXES + GBXML_SUFFIXES:
         if up == "y" or unit is not None:
             what = "IFC" if suffix in IFC_SUFFIXES else "gbXML"

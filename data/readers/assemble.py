@@ -3,12 +3,13 @@
 import re
 from collections import Counter
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..errors import InputError
 from ..scene import GRID_LIMIT, Definition, Instance, Mesh, Role, Scene, Space, degenerate, snap
+from .frame import turned, wall_yaw
 
 MAX_COORDINATE_M = 1.0e9
 # Strays are at most this share of the parts, and further off than this, and than so many times the others reach.
@@ -52,7 +53,8 @@ class Model:
     """What a reader found, in the file's own frame, metres, Z up.
 
     Attributes:
-        openings: boxes [m], each of shape (2, 3).
+        yaw: what the model is turned back by [degrees], or "auto" for the angle at which most of its walls stand.
+        openings: points of doors, windows and voids [m], each of shape (n, 3).
         skipped, notes: as in `Scene`.
     """
 
@@ -60,6 +62,7 @@ class Model:
     sha256: str
     unit: str
     grid_m: float
+    yaw: str | float = 0.0
     parts: list[Part] = field(default_factory=list)
     spaces: list[Space] = field(default_factory=list)
     openings: list[np.ndarray] = field(default_factory=list)
@@ -84,15 +87,23 @@ def assemble(model: Model) -> Scene:
     parts = [part for part in model.parts if _usable(part, model)]
     _require_opaque(parts, model)
     origin = _centre(parts, model)
+    yaw_deg = _yaw(parts, model)
+    if yaw_deg:
+        parts, spaces, openings = _turn_back(parts, model, origin, yaw_deg)
+    else:
+        spaces, openings = model.spaces, model.openings
     definitions, objects = _share(parts, origin, model)
     _require_opaque(objects, model)
-    boxes = [box - origin for box in model.openings if np.isfinite(box).all()]
+    boxes = [
+        np.array([points.min(axis=0), points.max(axis=0)]) - origin for points in openings if np.isfinite(points).all()
+    ]
     return Scene(
         definitions=definitions,
         objects=objects,
-        spaces=[Space(space.name, space.vertices - origin, space.faces) for space in model.spaces],
+        spaces=[Space(space.name, space.vertices - origin, space.faces) for space in spaces],
         openings=np.array(boxes).reshape(-1, 2, 3),
         origin=origin,
+        yaw_deg=yaw_deg,
         grid_m=model.grid_m,
         source=model.source,
         sha256=model.sha256,
@@ -100,6 +111,35 @@ def assemble(model: Model) -> Scene:
         skipped=model.skipped,
         notes=model.notes,
     )
+
+
+def _yaw(parts: list[Part], model: Model) -> float:
+    """What the model is turned back by [degrees]; noted if the file does not say so."""
+    if model.yaw != "auto":
+        return float(model.yaw)
+    yaw_deg = wall_yaw([(part.placed(), part.faces) for part in parts if part.role is Role.OCCLUDER])
+    if yaw_deg:
+        model.note("walls", f"most of their area stands at {yaw_deg:g} degrees: the model is turned back by as much")
+    return yaw_deg
+
+
+def _turn_back(
+    parts: list[Part], model: Model, origin: np.ndarray, yaw_deg: float
+) -> tuple[list[Part], list[Space], list[np.ndarray]]:
+    """Parts, rooms and openings, turned about a vertical through the origin."""
+
+    def back(points: np.ndarray) -> np.ndarray:
+        # The offset comes off first: far from 0 the turn itself would cost digits.
+        return turned(points - origin, -yaw_deg) + origin
+
+    again = []
+    for part in parts:
+        transform = part.transform.copy()
+        transform[:3, :3] = turned(part.transform[:3, :3].T, -yaw_deg).T
+        transform[:3, 3] = back(part.transform[:3, 3])
+        again.append(replace(part, transform=transform))
+    spaces = [replace(space, vertices=back(space.vertices)) for space in model.spaces]
+    return again, spaces, [back(points) for points in model.openings]
 
 
 def _centre(parts: list[Part], model: Model) -> np.ndarray:

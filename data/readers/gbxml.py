@@ -20,7 +20,6 @@ from .archive import only_file
 from .assemble import Model, Part, assemble
 from .rings import newell, ring_triangles
 from .roles import RoleRules, Taken
-from .turned import note_turned
 from .units import METRES, metres_per_unit
 
 WALLS = frozenset(
@@ -80,7 +79,6 @@ def read_gbxml(path: Path, model: Model, roles: RoleRules) -> Scene:
     for what, places in building.faults.items():
         more = f" and {len(places) - 1} more" if len(places) > 1 else ""
         model.note(f"{places[0]}{more}", what)
-    note_turned(model)
     return assemble(model)
 
 
@@ -268,7 +266,7 @@ def _add_opening(node: _Node, outer: np.ndarray, where: str, building: _Building
         return None
     if (off := _off(outer, ring)) > FLAT_M:
         building.fault(f"an opening off its surface's plane by up to {off:.2f} m", what)
-    building.model.openings.append(np.array([ring.min(axis=0), ring.max(axis=0)]))
+    building.model.openings.append(ring)
     if kind == AIR:
         return (ring,)
     if building.roles.leaves_out(name, key, kind):

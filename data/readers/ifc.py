@@ -18,7 +18,6 @@ from .ifc_schema import check_classes
 from .ifc_shapes import Shape, keep_bodies, shape_alone, shapes_of
 from .roles import RoleRules, Taken
 from .step import check_step
-from .turned import note_turned
 
 # The geometry of these is no surface that anything could stand before.
 NOT_OBJECTS = ("IfcOpeningElement", "IfcAnnotation", "IfcGrid", "IfcVirtualElement", "IfcSpatialElement")
@@ -49,7 +48,6 @@ def read_ifc(path: Path, model: Model, roles: RoleRules) -> Scene:
     except Exception as error:  # an attribute that is none of its kind shows only when it is asked for
         found = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path}: expected a sound IFC file, found {found[:200]}") from None
-    note_turned(model)
     return assemble(model)
 
 
@@ -300,7 +298,7 @@ def _find_openings(ifc: object, shapes: dict, model: Model) -> None:
     voids = shapes_of(ifc, include=_by_type(ifc, "IfcOpeningElement"))
     guid = {product.id(): product.GlobalId or "" for product in ifc.by_type("IfcProduct")}
     boxed = sorted((number for number in voids if len(voids[number].faces)), key=lambda number: (guid[number], number))
-    model.openings += [voids[number].box() for number in boxed]
+    model.openings += [voids[number].placed() for number in boxed]
     filled = {
         link.RelatedBuildingElement.id()
         for link in _by_type(ifc, "IfcRelFillsElement")
@@ -309,4 +307,4 @@ def _find_openings(ifc: object, shapes: dict, model: Model) -> None:
     fillers = {product.id() for name in ("IfcDoor", "IfcWindow", "IfcPlate") for product in _by_type(ifc, name)}
     for number in sorted(fillers - filled, key=lambda number: (guid[number], number)):
         if number in shapes and len(shapes[number].faces):
-            model.openings.append(shapes[number].box())
+            model.openings.append(shapes[number].placed())

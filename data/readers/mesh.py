@@ -70,11 +70,7 @@ def read_mesh(path: Path, model: Model, *, up: str | None, unit: str | float | N
             model.skip(part.name, f"{part.kind}: left out as asked")
         else:
             model.parts.append(part)
-    model.openings += [
-        np.array([placed.min(axis=0), placed.max(axis=0)])
-        for part in model.parts
-        if part.kind in HOLE_FILLERS and len(placed := part.placed())
-    ]
+    model.openings += [placed for part in model.parts if part.kind in HOLE_FILLERS and len(placed := part.placed())]
     return assemble(model)
 
 

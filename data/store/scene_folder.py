@@ -76,6 +76,7 @@ def scene_manifest(scene: Scene) -> dict[str, object]:
         "unit": scene.unit,
         "grid_m": scene.grid_m,
         "origin": [float(x) for x in scene.origin],
+        "yaw_deg": scene.yaw_deg,
         "max_snap_m": scene.max_snap_m(),
         "counts": {
             "definitions": len(scene.definitions),

@@ -94,6 +94,7 @@ def scene_from_tables(
         spaces=_spaces(spaces) if spaces is not None else [],
         openings=_openings(openings) if openings is not None else np.zeros((0, 2, 3)),
         origin=np.array(manifest["origin"], np.float64),
+        yaw_deg=float(manifest.get("yaw_deg", 0.0)),
         grid_m=float(manifest["grid_m"]),
         source=str(manifest.get("source", "")),
         sha256=str(manifest.get("sha256", "")),

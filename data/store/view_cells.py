@@ -66,7 +66,12 @@ def read_view_cells(path: str | Path, scene: Scene) -> CellGraph:
 
 
 def view_cells(
-    table: pa.Table, scene: Scene, where: str, *, origin: np.ndarray | None = None, inwards: bool = False
+    table: pa.Table,
+    scene: Scene,
+    where: str,
+    *,
+    placement: tuple[np.ndarray, float] | None = None,
+    inwards: bool = False,
 ) -> ViewCells:
     """View cells of a table, in its order, with ids of any kind; columns and errors as of `read_view_cells`.
 
@@ -74,7 +79,7 @@ def view_cells(
         table: min_x ... max_z [m].
         scene: the model.
         where: what to call the table in errors.
-        origin: of the table's coordinates in the model's own place [m]; 0 by default.
+        placement: origin [m] and yaw [degrees] of the table's frame in the model's own; 0 and 0 by default.
         inwards: snap so that every eye in the cell is in the given box, instead of the other way round.
     """
     require_columns_once(table, where)
@@ -84,7 +89,15 @@ def view_cells(
     if not table.num_rows:
         raise InputError(f"{where}: expected at least one view cell, found an empty table")
     boxes = numbers(table, CELL_COLUMNS[1:], Path(where)).reshape(-1, 2, 3)
-    shift = scene.origin if origin is None else scene.origin - origin
+    origin, yaw_deg = placement or (np.zeros(3), 0.0)
+    if yaw_deg != scene.yaw_deg:
+        raise InputError(
+            f"{where}: expected view cells of a model turned by {scene.yaw_deg:g} degrees, found {yaw_deg:g}; boxes of "
+            "the model's own frame need one that is read or baked with yaw 0"
+        )
+    if yaw_deg and not np.array_equal(origin, scene.origin):
+        raise InputError(f"{where}: expected the origin {scene.origin} of the turned model, found {origin}")
+    shift = scene.origin - origin
     steps = (boxes - shift) / scene.grid_m
     if np.abs(steps).max() > GRID_LIMIT:
         raise InputError(

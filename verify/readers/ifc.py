@@ -132,4 +132,4 @@ def _of_rooms(scene: Scene) -> Scene:
     """The rooms of a scene as its objects."""
     shapes = [Definition(space.name, (Mesh(space.vertices, space.faces),)) for space in scene.spaces]
     placed = [Instance(shape.name, "", i, np.eye(4), Role.DETAIL) for i, shape in enumerate(shapes)]
-    return Scene(shapes, placed, origin=scene.origin, grid_m=scene.grid_m)
+    return Scene(shapes, placed, origin=scene.origin, yaw_deg=scene.yaw_deg, grid_m=scene.grid_m)

@@ -74,7 +74,8 @@ def _text(box: np.ndarray) -> str:
 def _objects(scene: Scene) -> Iterable[Found]:
     for placed in scene.objects:
         mesh = scene.definitions[placed.definition_id].lods[0]
-        points = mesh.vertices @ placed.transform[:3, :3].T + placed.transform[:3, 3] + scene.origin
+        points = mesh.vertices @ placed.transform[:3, :3].T + placed.transform[:3, 3]
+        points = scene.in_model(points)
         corners = points[mesh.faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         area = float(np.linalg.norm(normals, axis=1).sum() / 2)

@@ -42,12 +42,12 @@ def fingerprint(scene: Scene | None, graph_folder: Path | None, settings: Settin
         for mesh in shape.lods:
             digest.update(mesh.vertices.tobytes() + mesh.faces.tobytes() + repr(mesh.error_m).encode())
     for placed in scene.objects:
-        digest.update(repr((placed.name, placed.kind, placed.definition_id, placed.role)).encode())
+        digest.update(repr((placed.name, placed.kind, placed.definition_id, placed.role, placed.guid)).encode())
         digest.update(placed.transform.tobytes())
     for space in scene.spaces:
         digest.update(space.name.encode() + space.vertices.tobytes() + space.faces.tobytes())
     digest.update(np.ascontiguousarray(scene.openings).tobytes())
-    digest.update(repr((scene.grid_m, scene.origin.tolist())).encode())
+    digest.update(repr((scene.grid_m, scene.origin.tolist(), scene.yaw_deg)).encode())
     return digest.hexdigest()
 
 

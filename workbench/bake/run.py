@@ -121,13 +121,14 @@ def _open(model: Scene | str | Path, settings: Settings) -> tuple[Scene | None, 
     if isinstance(model, Scene):
         return model, None
     path = Path(model)
-    if path.is_dir() and settings.reading:
-        raise InputError(f"{path}: expected a model file beside {', '.join(settings.reading)}, found a folder")
+    told = [*settings.reading, *(["yaw"] if settings.yaw != "auto" else [])]
+    if path.is_dir() and told:
+        raise InputError(f"{path}: expected a model file beside {', '.join(told)}, found a folder")
     if path.is_dir() and not (path / "manifest.json").exists():
         return None, path
     from ...data.readers import read
 
-    return read(path, **settings.reading), None
+    return read(path, **settings.reading, **settings.frame), None
 
 
 def default_out(model: Scene | str | Path) -> Path:

@@ -25,6 +25,8 @@ class ModelSettings:
         glass: as for `read`: regular expression in place of the words for glass and windows in names.
         doors_by: in place of the words for doors.
         leave_out: parts whose name, GUID or kind it finds are not read.
+        yaw: what the model is turned back by about the vertical [degrees], or "auto" for the angle at which most of its
+            walls stand. Scenes, and models whose view cells are a table of boxes, are not turned.
         seal: cracks narrower than this are closed [m]; 0 closes none. What is seen through them alone is then hidden
             though visible, and listed in leaks.parquet.
         split: connected components become objects of their own.
@@ -34,6 +36,7 @@ class ModelSettings:
     glass: str = ""
     doors_by: str = ""
     leave_out: str = ""
+    yaw: str = "auto"
     seal: float = 0.0
     split: bool = False
 
@@ -130,6 +133,16 @@ class LevelSettings:
 class Settings(LevelSettings, MethodSettings, CellSettings, ModelSettings):
     """What a bake's answer depends on; each group says what its values mean."""
 
+    @property
+    def frame(self) -> dict[str, str | float]:
+        """The option `yaw` of `read`: boxes of the model's own frame would be oblique in another."""
+        if self.yaw == "auto":
+            return {"yaw": "auto"} if self.cells in ("", "portals", "octree") else {}
+        try:
+            return {"yaw": float(self.yaw)}
+        except ValueError:
+            raise InputError(f"yaw: expected auto or degrees, found {self.yaw!r}") from None
+
     def check(self) -> None:
         """Raise InputError for a value out of range."""
         for name, value, least in (
@@ -146,6 +159,8 @@ class Settings(LevelSettings, MethodSettings, CellSettings, ModelSettings):
             raise InputError(f"method: expected {', '.join(METHODS)}, found {self.method!r}")
         if not 0 <= self.depth <= DEEPEST:
             raise InputError(f"depth: expected a whole number from 0 to {DEEPEST}, found {self.depth}")
+        if self.frame.get("yaw") not in (None, "auto", 0.0) and self.cells not in ("", "portals", "octree"):
+            raise InputError(f"yaw: expected auto or 0 beside a table of view cells, found {self.yaw}")
         _ = self.pixel_limit, self.vlod
 
 

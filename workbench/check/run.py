@@ -80,6 +80,8 @@ def check(
         return check_map(Path(model), _sources(pvs), cells, rays=rays, seed=seed, targets=targets, progress=progress)
     if pvs is None:
         raise InputError(f"{model}: expected claims beside it, found none")
+    if isinstance(model, str | Path) and Path(model).is_file() and (yaw_deg := _baked_yaw(cells)):
+        reading.setdefault("yaw", yaw_deg)
     opened = open_model(model, reading)
     if isinstance(opened, CellGraph):
         from .graph import check_graph
@@ -141,6 +143,13 @@ def _sources(pvs: object) -> Sequence[object]:
     return [] if pvs is None else list(pvs) if isinstance(pvs, list | tuple) else [pvs]
 
 
+def _baked_yaw(cells: object) -> float:
+    """What the model of a bake whose cells are taken is turned back by; 0 for anything else."""
+    if not isinstance(cells, str | Path) or not (Path(cells) / "manifest.json").is_file():
+        return 0.0
+    return float(read_manifest(Path(cells), kind="bake").get("yaw_deg", 0.0))
+
+
 def open_model(model: Scene | str | Path, reading: dict[str, object]) -> tuple[Scene, Path | None] | CellGraph:
     """The model, and where its own view cells are; or a bare graph. `reading` has options of `read`.
 
@@ -187,10 +196,11 @@ def _view_cells(cells: object, scene: Scene, model: str) -> ViewCells:
             raise InputError(f"cells: expected a table, found {error}") from None
     path = Path(cells)
     table_path = path / "cells.parquet" if path.is_dir() else path
-    origin = None
+    placement = None
     if (table_path.parent / "manifest.json").is_file() and read_kind(table_path.parent) == "bake":
-        origin = np.array(read_manifest(table_path.parent, kind="bake")["origin"], np.float64)
-    return view_cells(read_rows(table_path), scene, str(table_path), origin=origin, inwards=True)
+        manifest = read_manifest(table_path.parent, kind="bake")
+        placement = np.array(manifest["origin"], np.float64), float(manifest.get("yaw_deg", 0.0))
+    return view_cells(read_rows(table_path), scene, str(table_path), placement=placement, inwards=True)
 
 
 class _Hunt:

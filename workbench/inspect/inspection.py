@@ -70,6 +70,7 @@ class Inspection:
             "unit": scene.unit,
             "unit_because": self.unit_because,
             "origin": scene.origin.tolist(),
+            "yaw_deg": scene.yaw_deg,
             "size_m": self.size_m.tolist(),
             "max_snap_m": scene.max_snap_m(),
             "triangles": int(scene.triangle_counts.sum()),

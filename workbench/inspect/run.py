@@ -66,7 +66,8 @@ def _scene(model: Scene | str | Path, reading: "Mapping[str, object]") -> Scene:
         return model
     from ...data.readers import read
 
-    return read(model, **reading)
+    # As a bake takes it.
+    return read(model, **({"yaw": "auto"} | dict(reading) if not Path(model).is_dir() else reading))
 
 
 def _unit_because(model: Scene | str | Path, reading: "Mapping[str, object]") -> str:

@@ -27,11 +27,12 @@ def lines(found: Inspection) -> list[str]:
     scene, cells = found.scene, found.cells
     size = " x ".join(f"{x:,.1f}" for x in found.size_m)
     shift = ", ".join(f"{x:,.0f}" for x in scene.origin)
+    turn = f" and turned back by {scene.yaw_deg:g} degrees" if scene.yaw_deg else ""
     moved = 1e3 * scene.max_snap_m()
     count, inhabitable, portals = cells.counts
     rows = [
         ("model", scene.source or "scene"),
-        ("size", f"{size} m; moved by ({shift}) m; the grid moves no corner by more than {moved:.2g} mm"),
+        ("size", f"{size} m; moved by ({shift}) m{turn}; the grid moves no corner by more than {moved:.2g} mm"),
         ("unit", f"{scene.unit}: {found.unit_because}"),
         ("objects", _objects(found)),
         ("kinds", _counted(_by_kind(found.kinds), KINDS_SHOWN)),

@@ -248,7 +248,7 @@ OTHER = {
     "threshold_m2": 0.5, "seed": 1, "doors": "closed", "method": "both", "cells": "octree", "cell_size_m": 2.0,
     "depth": 1, "refine_triangles": 7, "refine_gap": 0.5, "certify": True, "clusters": 6, "objective": "centre",
     "resolution": 64, "split": True, "lods": True, "pixels": 2.0, "image": "64x64", "fov_deg": 70.0,
-    "seal": 0.01, "glass": "pane", "doors_by": "gate", "leave_out": "tree",
+    "seal": 0.01, "yaw": "17", "glass": "pane", "doors_by": "gate", "leave_out": "tree",
 }  # fmt: skip
 
 

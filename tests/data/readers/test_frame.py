@@ -1,0 +1,131 @@
+"""The yaw of walls, and models that are turned: read as if they were not."""
+
+import numpy as np
+import pytest
+import trimesh
+from builders import random_solids
+from viewcell.data.errors import InputError
+from viewcell.data.prepared import PreparedModel
+from viewcell.data.readers import read
+from viewcell.data.readers.frame import turned, wall_yaw
+from viewcell.data.store.bake_folder import read_bake
+from viewcell.data.store.scene_folder import read_scene, write_scene
+from viewcell.workbench.bake.run import bake
+from viewcell.workbench.bake.settings import Settings
+from viewcell.workbench.check.run import check
+from viewcell.workbench.cli import main
+from viewcell.workbench.summary import summary
+
+WALL = np.array([[0, 0, 0], [4, 0, 0], [4, 0, 3], [0, 0, 3]], float)
+FACES = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def wall(angle_deg, length=1.0):
+    return turned(WALL * [length, 1, 1], angle_deg)
+
+
+@pytest.mark.parametrize(
+    ("angle_deg", "yaw_deg"),
+    [(0, 0), (30, 30), (-30, -30), (60, -30), (90, 0), (200, 20), (1e-5, 0), (0.002, 0.002), (89.9995, -0.0005)],
+)
+def test_walls_stand_as_they_are_turned(angle_deg, yaw_deg):
+    assert wall_yaw([(wall(angle_deg), FACES)]) == pytest.approx(yaw_deg, abs=1e-6)
+
+
+def test_the_larger_area_counts_and_not_the_mean():
+    assert wall_yaw([(wall(10, 3.0), FACES), (wall(100), FACES), (wall(0), FACES)]) == pytest.approx(10)
+    houses = [(wall(0, 57), FACES), (wall(0.0084, 17), FACES), (wall(0.0177, 21), FACES)]
+    assert wall_yaw(houses) == 0.0
+    # Where directions begin again.
+    assert wall_yaw([(wall(-0.0004), FACES), (wall(0.0004), FACES), (wall(20, 1.5), FACES)]) == pytest.approx(
+        0, abs=1e-6
+    )
+
+
+def test_floors_stand_nowhere():
+    assert wall_yaw([(WALL[:, [0, 2, 1]], FACES)]) == 0.0 and wall_yaw([]) == 0.0
+
+
+def house(path, yaw_deg=0.0, away=(0.0, 0.0, 0.0)):
+    """Two rooms, a doorway between them, a chest in each; as an OBJ file, turned and moved."""
+    boxes = {
+        "floor": ([0, 0, -0.25], [8, 4, 0]), "roof": ([0, 0, 3], [8, 4, 3.25]),
+        "south": ([0, -0.25, 0], [8, 0, 3]), "north": ([0, 4, 0], [8, 4.25, 3]),
+        "west": ([-0.25, -0.25, -0.25], [0, 4.25, 3.25]), "east": ([8, -0.25, -0.25], [8.25, 4.25, 3.25]),
+        "mid low": ([3.75, 0, 0], [4, 0.5, 3]), "mid high": ([3.75, 1.5, 0], [4, 4, 3]),
+        "lintel": ([3.75, 0.5, 2], [4, 1.5, 3]),
+        "chest a": ([0.5, 3, 0], [1, 3.5, 1]), "chest b": ([4.5, 3, 0], [5, 3.5, 1]),
+    }  # fmt: skip
+    lines, base = [], 1
+    for name, (low, high) in boxes.items():
+        mesh = random_solids.box(low, high)
+        points = turned(np.array(mesh.vertices), yaw_deg) + away
+        lines += [f"o {name}", *(f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in points)]
+        lines += ["f " + " ".join(str(base + i) for i in face) for face in mesh.faces]
+        base += len(points)
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("away", [(0, 0, 0), (500_000, -2_600_000, 12)])
+@pytest.mark.parametrize("yaw_deg", [17.0, 45.0, -30.0, 84.0])
+def test_a_turned_house_is_baked_as_one_on_the_axes(yaw_deg, away, tmp_path):
+    model = house(tmp_path / "turned.obj", yaw_deg, away)
+    made = bake(model, tmp_path / "turned", threads=1)
+    # Turned back by 45 degrees at most: what is left are quarters.
+    back = made.manifest["yaw_deg"]
+    quarters = round((yaw_deg - back) / 90.0)
+    assert abs(back) < 45.001 and back == pytest.approx(yaw_deg - 90.0 * quarters, abs=1e-5)
+    plain = bake(house(tmp_path / "plain.obj", 90.0 * quarters), tmp_path / "plain", threads=1)
+    assert plain.manifest["yaw_deg"] == 0.0 and made.manifest["counts"] == plain.manifest["counts"]
+    assert made.potential_objects.sum() == plain.potential_objects.sum()
+    assert made.potential_cells.sum() == plain.potential_cells.sum()
+    assert f"turned back by {back:g} degrees" in summary(made)
+    # Its own claims stand, judged by the file.
+    assert check(model, made.folder, made.folder, rays=20_000).ok
+    again = bake(model, tmp_path / "turned", threads=1)
+    assert again.folder == made.folder and again.manifest == made.manifest
+
+
+def test_a_point_is_found_again_in_the_model(tmp_path):
+    away = np.array([100.0, 200.0, 3.0])
+    scene = read(house(tmp_path / "a.obj", 17.0, away), yaw="auto")
+    chest = next(i for i, placed in enumerate(scene.objects) if placed.name == "chest a")
+    middle = scene.object_bounds()[chest].mean(axis=0) * scene.grid_m
+    np.testing.assert_allclose(scene.in_model(middle), turned(np.array([0.75, 3.25, 0.5]), 17.0) + away, atol=1e-3)
+    write_scene(scene, tmp_path / "s.scene")
+    assert read_scene(tmp_path / "s.scene").yaw_deg == scene.yaw_deg == pytest.approx(17.0)
+
+
+def test_a_house_on_the_axes_is_not_touched(tmp_path):
+    path = house(tmp_path / "a.obj")
+    plain, auto = read(path), read(path, yaw="auto")
+    for a, b in zip(plain.triangles(), auto.triangles(), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert plain.notes == auto.notes and auto.yaw_deg == 0.0
+
+
+def test_boxes_of_the_model_need_the_model_as_it_stands(tmp_path):
+    """Turned into another frame they would be oblique."""
+    path, table = house(tmp_path / "a.obj", 17.0), tmp_path / "cells.csv"
+    table.write_text("min_x,min_y,min_z,max_x,max_y,max_z\n0.2,1.5,0.5,0.6,1.9,1\n")
+    made = bake(path, tmp_path / "b", settings=Settings(cells=str(table)), threads=1)
+    assert made.manifest["yaw_deg"] == 0.0 and read_bake(made.folder).scene.yaw_deg == 0.0
+    with pytest.raises(InputError, match="yaw"):
+        bake(path, tmp_path / "c", settings=Settings(cells=str(table), yaw="17"), threads=1)
+    turned_bake = bake(path, tmp_path / "d", threads=1)
+    with pytest.raises(InputError, match="turned by 17"):
+        check(turned_bake.folder, turned_bake.folder, table)
+
+
+@pytest.mark.parametrize("yaw", ["north", "inf", "400"])
+def test_what_is_no_angle_is_one_line(yaw, tmp_path, capsys):
+    assert main(["bake", str(house(tmp_path / "a.obj")), "--out", str(tmp_path / "b"), "--yaw", yaw]) == 2
+    assert "yaw: expected auto or degrees" in capsys.readouterr().err and not (tmp_path / "b").exists()
+
+
+def test_a_given_yaw_is_taken(tmp_path):
+    scene = read(house(tmp_path / "a.obj", 17.0), yaw=-73.0)
+    assert scene.yaw_deg == -73.0 and PreparedModel(scene).planes.axial_area > 0
+    corner = trimesh.bounds.corners(scene.object_bounds()[0] * scene.grid_m)
+    assert np.ptp(corner, axis=0)[:2] == pytest.approx([4.0, 8.0], abs=2e-3)
