@@ -186,8 +186,8 @@ def _breaks(edges: np.ndarray, oblique: np.ndarray, c: int, most: int) -> np.nda
 
 
 def _beside(coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Raster lines that keep what is lost beside a rounded edge thin."""
-    return coordinates - ROUNDED_REACH, coordinates + ROUNDED_REACH
+    """Raster lines that keep what is lost beside a rounded edge thin: as far as `_mark_near` marks across it."""
+    return coordinates - 2 * ROUNDED_REACH, coordinates + 2 * ROUNDED_REACH
 
 
 def _mark_near(a: np.ndarray, b: np.ndarray, us: np.ndarray, vs: np.ndarray, crossed: np.ndarray) -> None:
