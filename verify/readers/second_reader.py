@@ -12,13 +12,13 @@ from .referee import differences
 IFC, GBXML = (".ifc", ".ifczip"), (".xml", ".gbxml")
 
 
-def disagreements(scene: Scene, path: Path, *, metres: float = 1.0, up: str | None = None) -> list[str]:
+def disagreements(scene: Scene, path: Path, *, metres: float | None = None, up: str | None = None) -> list[str]:
     """What a second reader finds otherwise, one line each.
 
     Args:
         scene: what was read.
         path: the whole file that it was read from.
-        metres: length of a mesh file's unit.
+        metres: length of a mesh file's unit [m]; None for its own.
         up: axis that points up in a mesh file; None for the format's habit.
 
     Raises:

@@ -106,5 +106,5 @@ def _differences(model: Scene | str | Path, scene: Scene, reading: "Mapping[str,
     from ...verify.readers.second_reader import disagreements
 
     unit = reading.get("unit")
-    metres = 1.0 if unit is None else metres_per_unit(unit)[0]
+    metres = None if unit is None else metres_per_unit(unit)[0]
     return disagreements(scene, Path(model), metres=metres, up=reading.get("up"))

@@ -13,7 +13,7 @@ from viewcell.verify.readers.meshes import found_in_mesh
 from viewcell.verify.readers.referee import differences
 
 CASES, SCENES = SHARED / "cases" / "readers", SHARED / "scenes" / "mesh"
-KINDS = (".gltf", ".glb", ".obj", ".ply", ".stl")
+KINDS = (".gltf", ".glb", ".obj", ".ply", ".stl", ".dxf", ".bsp")
 SHARED_FILES = [path for path in sorted(CASES.glob("*.*")) if path.suffix in KINDS] if CASES.is_dir() else []
 UPS = {"complex.obj": "y", "institute.obj": "y", "clinic_arch.obj": "y"}
 
@@ -34,7 +34,7 @@ def test_both_readers_agree_on_shared_cases(path):
     try:
         assert compared(path) == []
     except InputError as error:
-        assert path.name.startswith(("gltf_draco", "gltf_meshopt", "gltf_unknown")), error
+        assert path.name.startswith(("gltf_draco", "gltf_meshopt", "gltf_unknown", "turned.bsp")), error
 
 
 @pytest.mark.skipif(not SCENES.is_dir(), reason="no shared scenes folder beside the checkout")
@@ -82,7 +82,7 @@ def test_planted_faults_are_named(tmp_path, name):
 
 
 def test_other_kinds_have_no_second_reader(tmp_path):
-    assert found_in_mesh(tmp_path / "a.dxf") is None
+    assert found_in_mesh(tmp_path / "a.step") is None
     assert np.array_equal(found_in_mesh_box(tmp_path), [[0, 0, -0.25], [8, 4, 0]])
 
 
