@@ -110,10 +110,10 @@ def test_up_and_unit_reach_the_reader(tmp_path, monkeypatch):
     model = tmp_path / "a.obj"
     model.write_text("v 0 0 0\n")
     assert main(["bake", str(model), "--up", "y", "--unit", "0.0254", "--doors", "closed"]) == 2
-    assert seen == {"up": "y", "unit": 0.0254, "doors": "closed"}
+    assert seen == {"up": "y", "unit": 0.0254, "doors": "closed", "yaw": "auto"}
     seen.clear()
     assert main(["bake", str(model), "--unit", "foot"]) == 2
-    assert seen == {"up": None, "unit": "foot"}
+    assert seen == {"up": None, "unit": "foot", "yaw": "auto"}
 
 
 def test_a_closed_pipe_is_quiet_and_keeps_the_exit_code(baked):

@@ -392,7 +392,15 @@ def test_turned_is_the_house_turned_and_noted(name, angle_deg):
         found = [points.min(axis=0), points.max(axis=0)]
         np.testing.assert_allclose(found, HOUSE[placed.name], atol=1e-3, err_msg=placed.name)
     assert len(scene.objects) == 12 and len(scene.spaces) == 2
-    assert f"{angle_deg}.00 degrees" in scene.notes[-1]["why"]
+    # As a bake reads it, it stands along the axes.
+    back = read(ifc_case(name), yaw="auto")
+    assert back.yaw_deg == pytest.approx(angle_deg, abs=1e-5) and f"{angle_deg} degrees" in back.notes[-1]["why"]
+    walls = {
+        placed.name: np.ptp(box, axis=0) * GRID_M
+        for placed, box in zip(back.objects, back.object_bounds(), strict=True)
+    }
+    for name, size in walls.items():
+        np.testing.assert_allclose(size, np.ptp(HOUSE[name], axis=0), atol=2e-3, err_msg=name)
 
 
 def test_parts_of_a_wall_are_wall():
