@@ -15,6 +15,8 @@ KINDS_SHOWN, TOLD_SHOWN, SKIPPED_SHOWN, NAMED = 5, 4, 3, 2
 TURNED_SHARE, OPEN_SHARE = 0.1, 0.05
 # A building that is so much lower along y than otherwise may lie on its side.
 LYING_SHARE = 0.5
+# Walls as near to an axis as this are meant to stand along it.
+NEARLY_DEG = 0.5
 # A building larger than this, or smaller than that [m], is likely in another unit.
 LARGE_M, SMALL_M = 5000.0, 0.5
 
@@ -105,7 +107,9 @@ def _directions(found: Inspection) -> str:
         return "nothing upright is opaque"
     text = f"{100 * ways.axial:.1f} % of their area exactly along x or y"
     if ways.yaw > 0:
-        text += f", {100 * ways.yaw:.1f} % turned by about {ways.yaw_deg:g} degrees, {100 * ways.other:.1f} % otherwise"
+        off = min(ways.yaw_deg, 90.0 - ways.yaw_deg)
+        turn = "less than a degree off that" if off <= NEARLY_DEG else f"turned by about {ways.yaw_deg:g} degrees"
+        text += f", {100 * ways.yaw:.1f} % {turn}, {100 * ways.other:.1f} % otherwise"
     return text
 
 
@@ -195,10 +199,14 @@ def _reading(found: Inspection) -> Iterator[Words]:
         )
     if max(found.size_m) > LARGE_M or max(found.size_m) < SMALL_M:
         yield (
-            f"the model is {max(found.size_m):,.4g} m long",
+            f"the model is {_metres(max(found.size_m))} m long",
             "distances, cell sizes and levels of detail are off if its unit is another",
             "tell the unit: --unit millimetre, inch, ...",
         )
+
+
+def _metres(length: float) -> str:
+    return f"{length:,.0f}" if length >= 1.0 else f"{length:.3g}"
 
 
 def _walls(found: Inspection) -> Iterator[Words]:
