@@ -5,6 +5,8 @@ has one. A block is placed point by point, through every INSERT about it.
 """
 
 import math
+import re
+import string
 import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -33,6 +35,8 @@ CLOSED_ROWS, SMOOTH, NET, CLOSED_COLUMNS, POLYFACE = 1, 4, 16, 32, 64
 OF_SURFACE, PLACE, FACE = 8, 64, 128
 # An extrusion closer to Z than this takes its X axis from Y.
 NEAR_Z = 1 / 64
+# Blanks that do not break a line.
+_BLANKS = re.compile("[\u00a0\u1680\u2000-\u200a\u202f\u205f\u3000]")
 
 Group = tuple[int, bytes]
 
@@ -172,12 +176,13 @@ class _Drawing:
         return METRES.get(int(self.header.get(b"$INSUNITS", b"0")), 1.0)
 
     def words(self, record: _Record, code: int, default: bytes = b"") -> str:
-        """A text in the file's own coding; a sign that it lacks stays the number that is written for it."""
-        coding = "utf-8"
-        if self.header.get(b"$ACADVER", b"AC1009") < b"AC1021":
+        """A text in the file's own coding; before R2007 with numbers for the signs that this lacks."""
+        coding, old = "utf-8", self.header.get(b"$ACADVER", b"AC1009") < b"AC1021"
+        if old:
             page = self.header.get(b"$DWGCODEPAGE", b"").decode("latin-1").rpartition("_")[2]
             coding = f"cp{page}" if page in map(str, CODE_PAGES) else "cp1252"
-        return record.text(code, default).decode(coding, errors="surrogateescape")
+        text = record.text(code, default).decode(coding, errors="surrogateescape")
+        return _spelt(text) if old else text
 
     def objects(self) -> Iterator[tuple[str, list[list[Point]]]]:
         """Name and polygons of each object."""
@@ -240,6 +245,29 @@ class _Drawing:
                 x, y = column * across, row * along
                 step = math.cos(turn) * x - math.sin(turn) * y, math.sin(turn) * x + math.cos(turn) * y
                 yield _Frame(base, scale, turn, [at[0] + step[0], at[1] + step[1], at[2]], axes), inside
+
+
+def _spelt(text: str) -> str:
+    r"""The text with what \U+ and four digits stand for; those in a row stay if they are no text on one line."""
+    first, *rest = text.split("\\U+")
+    out, units, written = [first], [], ""
+    for part in rest:
+        if len(part) < 4 or set(part[:4]) - set(string.hexdigits):
+            out += [_of_units(units, written), "\\U+", part]
+            units, written = [], ""
+            continue
+        units, written = [*units, int(part[:4], 16)], f"{written}\\U+{part[:4]}"
+        if part[4:]:
+            out += [_of_units(units, written), part[4:]]
+            units, written = [], ""
+    return "".join([*out, _of_units(units, written)])
+
+
+def _of_units(units: list[int], written: str) -> str:
+    """The text of units of UTF-16; as written if it has half a pair, or what is neither printed nor a blank."""
+    text = struct.pack(f"<{len(units)}H", *units).decode("utf-16-le", errors="replace")
+    halves = text.count("\ufffd") != units.count(0xFFFD)
+    return written if halves or not "".join(_BLANKS.split(text)).isprintable() else text
 
 
 def _axes(extrusion: Point) -> list[list[float]]:

@@ -116,10 +116,47 @@ def test_objects_of_the_house(tmp_path):
     assert sum(one.area for one in found_in_dxf(path)) == 367.5
 
 
-def test_signs_that_a_coding_lacks_stay_numbers(tmp_path):
-    path = saved(tmp_path / "a.dxf", lambda drawing: square(drawing, layer="墙 a"), "R2000", "asc")
-    assert list(boxes(path)) == ["\\U+5899 a"]
+@pytest.mark.parametrize("form", ["asc", "bin"])
+@pytest.mark.parametrize("version", VERSIONS[:3])
+def test_signs_that_a_coding_lacks_are_numbers(tmp_path, version, form):
+    def draw(drawing):
+        square(drawing, layer="\u5899 a")
+        drawing.blocks.new("T\u0159\xfcr").add_3dface(SQUARE)
+        drawing.modelspace().add_blockref("T\u0159\xfcr", (9, 0, 0))
+
+    path = saved(tmp_path / "a.dxf", draw, version, form)
+    assert b"\\U+5899" in path.read_bytes()
+    assert list(boxes(path)) == ["\u5899 a", "T\u0159\xfcr"]
     assert differences(read(path), found_in_dxf(path)) == []
+
+
+# What a name says, and what it reads as before R2007.
+SPELT = {
+    "a\\U+00fcb": "a\xfcb",
+    "\\U+00E9\\U+00A0x": "\xe9\xa0x",
+    "\\U+D83D\\U+DE00": "\U0001f600",
+    "a\\U+D83D": None,
+    "\\U+DE00\\U+D83D": None,
+    "a\\U+000Ab": None,
+    "a\\U+2028b": None,
+    "\\U+0001f600": None,
+    "\\U+12": None,
+    "\\U+\\U+0041": "\\U+A",
+    "\\U+0041\\U+zz": "A\\U+zz",
+    "\\U+FFFDx": "\ufffdx",
+    "\\u+0041": None,
+}
+
+
+@pytest.mark.parametrize("said", SPELT)
+def test_numbers_that_are_no_text_stay(tmp_path, said):
+    for version in ("R2004", "R2007"):
+        content = dxf(lambda drawing: square(drawing, layer="PLACE"), version=version)
+        (tmp_path / "a.dxf").write_bytes(content.replace(b"PLACE", said.encode()))
+        meant = (SPELT[said] if version == "R2004" else None) or said
+        assert list(boxes(tmp_path / "a.dxf")) == [meant]
+        scene = read(tmp_path / "a.dxf")
+        assert [placed.name for placed in scene.objects] == [meant]
 
 
 @pytest.mark.parametrize("number", range(25))
@@ -162,8 +199,14 @@ def test_both_readers_agree_on_blocks_at_random(tmp_path, seed):
 
     def turned(size: float) -> dict:
         extrusion = chance.choice([(0, 0, 1), (0, 0, -1), point()])
-        scale = {"xscale": size, "yscale": size, "zscale": size}
+        scale = {"xscale": size, "yscale": size * chance.choice([1, 0.5]), "zscale": size * chance.choice([1, -2])}
         return {"rotation": chance.uniform(0, 360), "extrusion": extrusion, "layer": chance.choice("0CD"), **scale}
+
+    def rows() -> dict:
+        if chance.random() < 0.5:
+            return {}
+        spacing = {"column_spacing": point()[0], "row_spacing": chance.choice([0, 4])}
+        return {"column_count": 3, "row_count": 2, **spacing}
 
     def draw(drawing):
         names = [f"block {k}" for k in range(5)]
@@ -172,15 +215,10 @@ def test_both_readers_agree_on_blocks_at_random(tmp_path, seed):
             for _ in range(2):
                 block.add_3dface([point(), point(), point()], dxfattribs={"layer": chance.choice("0AB")})
             if k:
-                block.add_blockref(chance.choice(names[:k]), point(), dxfattribs=turned(chance.choice([1, 2, -1])))
+                place = turned(chance.choice([1, 2, -1])) | rows()
+                block.add_blockref(chance.choice(names[:k]), point(), dxfattribs=place)
         for _ in range(4):
-            rows = {
-                "column_count": 3,
-                "column_spacing": point()[0],
-                "row_count": 2,
-                "row_spacing": chance.choice([0, 4]),
-            }
-            place = turned(chance.uniform(0.5, 2)) | (rows if chance.random() < 0.5 else {})
+            place = turned(chance.uniform(0.5, 2)) | rows()
             drawing.modelspace().add_blockref(chance.choice(names), point(20), dxfattribs=place)
 
     path = written(tmp_path / "a.dxf", draw)
@@ -197,6 +235,7 @@ def test_an_array_is_scaled_with_the_block_that_holds_it(tmp_path):
     path = written(tmp_path / "a.dxf", draw)
     assert boxes(path) == {"row": [[11, 0, 0], [39, 21, 3]]}
     assert found_in_dxf(path)[0].area == 6 * 24
+    assert differences(read(path), found_in_dxf(path)) == []
 
 
 def test_a_turned_block_is_stretched_with_the_block_that_holds_it(tmp_path):
@@ -206,7 +245,9 @@ def test_a_turned_block_is_stretched_with_the_block_that_holds_it(tmp_path):
         drawing.modelspace().add_blockref("set", (9, 0, 0), dxfattribs={"xscale": 3})
 
     reach = round(12 + 3 * 4 * np.cos(np.pi / 6), 9)
-    assert boxes(written(tmp_path / "a.dxf", draw)) == {"set": [[12, 0, 0], [reach, 2, 3]]}
+    path = written(tmp_path / "a.dxf", draw)
+    assert boxes(path) == {"set": [[12, 0, 0], [reach, 2, 3]]}
+    assert differences(read(path), found_in_dxf(path)) == []
 
 
 @pytest.mark.parametrize(("m_close", "n_close", "area"), [(0, 0, 6.0), (1, 0, 12.0), (0, 1, 12.0), (1, 1, 24.0)])
@@ -220,8 +261,10 @@ def test_nets_close_where_they_say(tmp_path, m_close, n_close, area):
                 mesh.set_mesh_vertex((m, n), (m, n, 0))
         mesh.close(m_close=bool(m_close), n_close=bool(n_close))
 
-    (one,) = found_in_dxf(written(tmp_path / "a.dxf", draw))
+    path = written(tmp_path / "a.dxf", draw)
+    (one,) = found_in_dxf(path)
     assert one.area == area and one.box.tolist() == [[0, 0, 0], [2, 3, 0]]
+    assert differences(read(path), found_in_dxf(path)) == []
 
 
 def test_a_smoothed_net_is_its_surface(tmp_path):
@@ -233,6 +276,7 @@ def test_a_smoothed_net_is_its_surface(tmp_path):
     head = "0\nSECTION\n2\nENTITIES\n0\nPOLYLINE\n8\nnet\n66\n1\n70\n20\n71\n2\n72\n2\n73\n3\n74\n3\n"
     (tmp_path / "a.dxf").write_text(head + frame + surface + "0\nSEQEND\n0\nENDSEC\n0\nEOF\n")
     assert boxes(tmp_path / "a.dxf") == {"net": [[0, 0, 1], [2, 2, 1]]}
+    assert differences(read(tmp_path / "a.dxf"), found_in_dxf(tmp_path / "a.dxf")) == []
 
 
 def test_comments_and_line_ends_of_any_kind(tmp_path):
