@@ -137,8 +137,7 @@ class Scene:
 
     def in_model(self, points: np.ndarray) -> np.ndarray:
         """Points of the scene's frame [m] in the model's own, shape (..., 3), float64."""
-        cos, sin = np.cos(np.radians(self.yaw_deg)), np.sin(np.radians(self.yaw_deg))
-        return points @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) + self.origin
+        return turned(points, self.yaw_deg) + self.origin
 
     def world_vertices(self, object_id: int, lod: int = 0) -> np.ndarray:
         """Snapped world vertices of one object [grid steps], shape (n, 3), int32.
@@ -229,6 +228,12 @@ class Scene:
         np.minimum.at(bounds[:, 0], owners, triangles.min(axis=1))
         np.maximum.at(bounds[:, 1], owners, triangles.max(axis=1))
         return bounds
+
+
+def turned(points: np.ndarray, yaw_deg: float) -> np.ndarray:
+    """Points, shape (..., 3), turned counter-clockwise about the z axis."""
+    cos, sin = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
+    return points @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
 def snap(metres: np.ndarray, grid_m: float, where: str) -> np.ndarray:

@@ -124,26 +124,18 @@ def _read(model: Path, options: argparse.Namespace, reading: dict[str, object]) 
         raise InputError(f"{model}: expected a model file beside --up and --unit, found a folder")
     from ..data.readers import read
 
-    return read(model, up=options.up, unit=_unit(options.unit), **reading)
+    return read(model, up=options.up, unit=_number_or_name(options.unit), **reading)
 
 
 def _reading(options: argparse.Namespace) -> dict[str, object]:
     """Options of `read` that were given."""
     asked = {name: getattr(options, name) for name in ("up", "doors", "glass", "doors_by", "leave_out")}
-    asked["unit"], asked["yaw"] = _unit(options.unit), _yaw(options.yaw)
+    asked["unit"], asked["yaw"] = _number_or_name(options.unit), _number_or_name(options.yaw)
     return {name: value for name, value in asked.items() if value is not None}
 
 
-def _yaw(text: str | None) -> str | float | None:
-    """Degrees, or what `read` takes instead."""
-    try:
-        return text if text is None else float(text)
-    except ValueError:
-        return text
-
-
-def _unit(text: str | None) -> str | float | None:
-    """A unit's name, or metres as a number."""
+def _number_or_name(text: str | None) -> str | float | None:
+    """A unit's name or metres, a yaw's or degrees: what is a number is read as one."""
     try:
         return text if text is None else float(text)
     except ValueError:

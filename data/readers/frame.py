@@ -48,9 +48,3 @@ def wall_yaw(meshes: list[tuple[np.ndarray, np.ndarray]]) -> float:
     yaw = float(np.average(angle[inside], weights=area[inside])) % 90.0
     yaw = round(yaw - 90.0 if yaw > 45.0 else yaw, 7)
     return yaw if abs(yaw) > LEAST_DEG else 0.0
-
-
-def turned(points: np.ndarray, yaw_deg: float) -> np.ndarray:
-    """Points, shape (..., 3), turned counter-clockwise about the z axis."""
-    cos, sin = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
-    return points @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])

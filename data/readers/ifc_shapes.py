@@ -48,11 +48,6 @@ class Shape:
         """Vertices in the model's frame [m]."""
         return self.vertices @ self.transform[:3, :3].T + self.transform[:3, 3]
 
-    def box(self) -> np.ndarray:
-        """Box in the model's frame [m], shape (2, 3)."""
-        placed = self.placed()
-        return np.array([placed.min(axis=0), placed.max(axis=0)])
-
 
 def keep_bodies(products: Iterable) -> dict[int, str]:
     """Take from products, in memory, the representations that are no bodies; one without items stops the iterator.

@@ -4,25 +4,12 @@ import numpy as np
 import pytest
 from viewcell.data.scene import Scene
 
+from .model_files import HOUSE
 from .places import SHARED
 
 IFC_CASES = SHARED / "cases" / "readers" / "ifc"
 IFC_MODELS = SHARED / "scenes" / "ifc"
 GBXML_MODELS = SHARED / "scenes" / "gbxml"
-HOUSE = {
-    "floor": ((0, 0, -0.25), (8, 4, 0)),
-    "roof": ((0, 0, 3), (8, 4, 3.25)),
-    "wall south": ((0, -0.25, -0.25), (8, 0, 3.25)),
-    "wall north": ((0, 4, -0.25), (8, 4.25, 3.25)),
-    "wall west": ((-0.25, -0.25, -0.25), (0, 4.25, 3.25)),
-    "wall east": ((8, -0.25, -0.25), (8.25, 4.25, 3.25)),
-    "mid low": ((3.75, 0, 0), (4, 0.5, 3)),
-    "mid high": ((3.75, 1.5, 0), (4, 4, 3)),
-    "mid lintel": ((3.75, 0.5, 2), (4, 1.5, 3)),
-    "box a": ((0.5, 3, 0), (1, 3.5, 1)),
-    "box b": ((4.5, 3, 0), (5, 3.5, 1)),
-    "box c": ((7, 0.5, 0), (7.5, 1, 1)),
-}
 
 
 def ifc_case(name: str):

@@ -2,7 +2,7 @@
 
 import shutil
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -161,7 +161,7 @@ def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dic
     facts |= {"budget_spent": spent, **tuned}
     scene = None if sources.model is None else sources.model.scene
     if sources.closed is not None:
-        extra |= _leaks(sources, (cell_rows, object_rows), run)
+        extra |= _leaks(sources, (cell_rows, object_rows), settings, run)
         clock.lap("leaks")
     if sources.model is not None and not spent:
         facts["counts"] = facts["counts"] | _triangle_counts(sources.model, graph, object_rows, run.device)
@@ -179,15 +179,13 @@ def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dic
     return Bake(run.out, written)
 
 
-def _leaks(sources: Sources, rows: tuple[Rows, Rows], run: _Run) -> dict[str, pa.Table]:
+def _leaks(sources: Sources, rows: tuple[Rows, Rows], settings: Settings, run: _Run) -> dict[str, pa.Table]:
     """Tables of the cracks that are closed and of the pairs that nothing else hides."""
-    from ...solvers.visibility.portal_engine import PortalEngine
-
     graph, closed, scene = sources.graph, sources.closed, sources.model.scene
     fields = "portal_cells", "portal_axis", "portals"
     both = [np.concatenate([getattr(part, name) for part in (graph, closed)]) for name in fields]
     whole = CellGraph(graph.cells, graph.inhabitable, graph.cell_names, *both)
-    engine = PortalEngine(sources.model, whole, method=sources.method, device=run.device)
+    engine = _engine(replace(sources, graph=whole), settings, run.device)
     parts = [engine.visible(block, aim=False) for block in in_blocks(sources)]
     pairs = []
     for open_rows, kept, targets in zip(engine.join(parts), rows, (graph.cell_count, len(scene.objects)), strict=True):

@@ -6,7 +6,8 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from builders.awkward import HOUSE, assert_house, boxes, ifc_case
+from builders.awkward import assert_house, boxes, ifc_case
+from builders.model_files import HOUSE
 from builders.mutated import mutated
 from builders.step_house import Step, house
 from viewcell.data.errors import InputError
