@@ -20,14 +20,20 @@ class Blockers:
     """Rectangles that block.
 
     Attributes:
-        boxes: flat boxes [grid steps], shape (blockers, 2, 3), int32.
-        axis: the axis each is perpendicular to, shape (blockers,), int32.
+        boxes: flat boxes, or boxes of curtains [grid steps], shape (blockers, 2, 3), int32.
+        axis: the axis each is perpendicular to, or the kind of curtain (data/curtains.py), shape (blockers,), int32.
         hierarchy: over the boxes.
     """
 
     boxes: np.ndarray
     axis: np.ndarray
     hierarchy: Hierarchy
+
+
+def join_blockers(parts: list[Blockers]) -> Blockers:
+    """All of some blockers, in order."""
+    boxes = np.concatenate([part.boxes for part in parts])
+    return Blockers(boxes, np.concatenate([part.axis for part in parts]), build_hierarchy(boxes))
 
 
 def find_blockers(graph: CellGraph, opaque: OpaquePlanes | None = None) -> Blockers:

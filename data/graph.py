@@ -3,9 +3,11 @@
 Source: Funkhouser et al. 1996, section 3.1 (cells, portals, adjacency graph).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+
+from .plans import NO_PLANS, Plans
 
 OTHER_AXES = np.array([[1, 2], [0, 2], [0, 1]])
 
@@ -21,6 +23,8 @@ class CellGraph:
         portal_cells: (low side, high side) cell of each portal, shape (portals, 2), int32.
         portal_axis: the axis that the portal is perpendicular to, shape (portals,), int8.
         portals: flat boxes (low, high corner), shape (portals, 2, 3), int32; low == high on `portal_axis`.
+        plans: of view cells that stand at an angle, or follow a room, beside the cells that tile space: they come last,
+            have no portals, may overlap everything, and only objects are claimed to be visible from them.
     """
 
     cells: np.ndarray
@@ -29,6 +33,20 @@ class CellGraph:
     portal_cells: np.ndarray
     portal_axis: np.ndarray
     portals: np.ndarray
+    plans: Plans = NO_PLANS
+
+    @property
+    def tile_count(self) -> int:
+        """Number of cells that tile space: those without a plan, which come first."""
+        return self.cell_count - len(self.plans.rows)
+
+    @property
+    def tiles(self) -> "CellGraph":
+        """The same without view cells that have a plan."""
+        n = self.tile_count
+        return replace(
+            self, cells=self.cells[:n], inhabitable=self.inhabitable[:n], cell_names=self.cell_names[:n], plans=NO_PLANS
+        )
 
     @property
     def cell_count(self) -> int:
@@ -43,7 +61,7 @@ class CellGraph:
     def with_portals(self, chosen: np.ndarray) -> "CellGraph":
         """The same cells with some of the portals: indices or a mask."""
         kept = self.portal_cells[chosen], self.portal_axis[chosen], self.portals[chosen]
-        return CellGraph(self.cells, self.inhabitable, self.cell_names, *kept)
+        return CellGraph(self.cells, self.inhabitable, self.cell_names, *kept, self.plans)
 
     def adjacency(self) -> tuple[np.ndarray, np.ndarray]:
         """Portals of each cell, as rows of a compressed table.

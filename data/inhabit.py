@@ -12,14 +12,15 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from .graph import CellGraph
+from .room_cells import in_room, room_name
 from .scene import Scene
-from .solids import winding_numbers
 
 SMALLEST_SIDE_M = 0.3
 SMALLEST_ROOM_M3 = 5.0
 SEALED_SHARE = 0.5
-OBLIQUE_SHARE = 0.1
 SHUT_MARGIN_M = 0.01
+# A cell is named after the rooms that hold so much of it.
+NAMED_SHARE = 0.3
 # Sample points per axis when a cell's share of the rooms is estimated.
 SAMPLES = 4
 
@@ -74,17 +75,12 @@ def find_inhabitable(scene: Scene, graph: CellGraph) -> Inhabited:
 
 
 def _rooms_of(scene: Scene, graph: CellGraph, roomy: np.ndarray) -> np.ndarray:
-    """Name of the room that holds more than half of each cell, "" elsewhere.
-
-    A room that holds half of none, such as one that stands oblique to the cells, names the cell that holds most of it
-    and those of which it holds a tenth.
-    """
+    """Names of the rooms of each cell that lies in rooms by more than half, "" elsewhere."""
     share = np.zeros(graph.cell_count)
     names = np.full(graph.cell_count, "", object)
-    steps = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    # Beside the middle, where a diagonal of two triangles may run.
+    steps = (np.arange(SAMPLES) + 0.497) / SAMPLES
     unit = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
-    volume = np.prod((graph.cells[:, 1] - graph.cells[:, 0]) * scene.grid_m, axis=1)
-    held: list[tuple[str, np.ndarray]] = []
     for space in scene.spaces:
         corners = space.vertices[space.faces] / scene.grid_m
         low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
@@ -93,19 +89,12 @@ def _rooms_of(scene: Scene, graph: CellGraph, roomy: np.ndarray) -> np.ndarray:
             continue
         boxes = graph.cells[near].astype(float)
         points = boxes[:, :1] + unit[None] * (boxes[:, 1:] - boxes[:, :1])
-        inside = np.abs(winding_numbers(points.reshape(-1, 3), corners)).reshape(points.shape[:2]) > 0.5
+        inside = in_room(space, points.reshape(-1, 3) * scene.grid_m).reshape(points.shape[:2])
         mine = inside.mean(axis=1)
-        better = mine > share[near]
         share[near] += mine
-        names[near[better & (mine > 0)]] = space.name or "room"
-        if mine.any():
-            most = np.arange(len(near)) == (mine * volume[near]).argmax()
-            held.append((space.name or "room", near[most | (mine > OBLIQUE_SHARE)]))
+        for cell in near[mine > NAMED_SHARE]:
+            names[cell] = f"{names[cell]}, {room_name(space)}" if names[cell] else room_name(space)
     names[share <= 0.5] = ""
-    found = set(names)
-    for name, cells in held:
-        if name not in found:
-            names[cells] = [f"{other}, {name}" if other else name for other in names[cells]]
     return names
 
 

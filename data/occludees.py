@@ -7,17 +7,30 @@ around them are conservative.
 
 from dataclasses import dataclass
 from hashlib import sha256
+from itertools import product
 
 import numpy as np
 
+from .frame import wall_yaw
 from .hierarchy import build_levels
 from .incidence import CHUNK, clip_bounds
+from .plans import Plans
 from .ragged import owners_of, places_of
-from .scene import Scene
+from .scene import Scene, turned
 
 # Pieces are no smaller than this, and at most PIECES along an axis of their object.
 PIECE_M = 1.0
 PIECES = 4
+# Objects that stand further off the axes than this [degrees] are cut in their own frame.
+OBLIQUE_DEG = 0.05
+# Snapping turns a short face by so much.
+SNAPPED_DEG = 0.1
+# Rounding into that frame and back moves a corner by no more [grid steps].
+ROUNDING = 2
+# Pieces in an object's own frame must hold it in so much less than pieces along the axes.
+TIGHTER = 0.9
+# Which of four corners to take from the object itself: all, all but one, ..., none.
+FEWER_CORNERS = sorted(product((True, False), repeat=4), key=sum, reverse=True)
 
 
 @dataclass
@@ -30,6 +43,7 @@ class Occludees:
             are objects.
         objects: object of each node of the last level, -1 for none, int32.
         pieces: boxes that together hold all triangles of their object, shape (pieces, 2, 3), int32.
+        plans: of pieces that stand at an angle; then it is these prisms that hold the triangles.
         starts: pieces of object o are starts[o]:starts[o + 1], shape (objects + 1,), int64.
     """
 
@@ -37,6 +51,7 @@ class Occludees:
     levels: list[np.ndarray]
     objects: np.ndarray
     pieces: np.ndarray
+    plans: Plans
     starts: np.ndarray
 
     @property
@@ -52,24 +67,132 @@ def find_occludees(scene: Scene) -> Occludees:
     levels, objects = build_levels(bounds[present])
     # An empty node's -1 takes the last entry: -1.
     objects = np.append(present, -1)[objects].astype(np.int32)
-    pieces, owner = _pieces(scene, bounds)
-    return Occludees(
-        bounds.astype(np.int32), levels, objects, pieces, np.searchsorted(owner, np.arange(len(bounds) + 1))
-    )
+    pieces, plans, owner = _pieces(scene, bounds)
+    starts = np.searchsorted(owner, np.arange(len(bounds) + 1))
+    return Occludees(bounds.astype(np.int32), levels, objects, pieces, plans, starts)
 
 
-def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pieces of all objects in object order, and the object of each."""
+def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, Plans, np.ndarray]:
+    """Pieces of all objects in object order, their plans, and the object of each."""
     triangles, owners = scene.triangles()
     models = _models(triangles, owners, bounds)
     cut = models[owners] == owners
-    boxes, owner = _cut(triangles[cut], owners[cut], bounds, round(PIECE_M / scene.grid_m))
+    triangles, owners = triangles[cut], owners[cut]
+    yaw = _yaws(triangles, owners, len(bounds))
+    least, plain = round(PIECE_M / scene.grid_m), yaw[owners] == 0
+    boxes, owner = _cut(triangles, owners, bounds, least)
+    corners, oblique = _cut_turned(triangles[~plain], owners[~plain], yaw, least)
+    # Leaning objects fill no frame that is turned about the vertical: whichever holds them in less.
+    size = (boxes[:, 1] - boxes[:, 0] + 1.0).prod(axis=1)
+    across = corners[:, 2, :2] - corners[:, 0, :2], corners[:, 3, :2] - corners[:, 1, :2]
+    area = np.abs(across[0][:, 0] * across[1][:, 1] - across[0][:, 1] * across[1][:, 0]) / 2
+    turned_size = area * (corners[:, 2, 2] - corners[:, 0, 2] + 1.0)
+    total = [np.bincount(o, s, minlength=len(bounds)) for o, s in ((owner, size), (oblique, turned_size))]
+    tighter = (total[1] > 0) & (total[1] < TIGHTER * total[0])
+    boxes, owner = boxes[~tighter[owner]], owner[~tighter[owner]]
+    corners, oblique = corners[tighter[oblique]], oblique[tighter[oblique]]
+    around = np.full((len(corners), 2, 3), 0)
+    around[:, 0, :2], around[:, 1, :2] = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
+    around[:, 0, 2], around[:, 1, 2] = corners[:, 0, 2], corners[:, 2, 2]
+    place = np.concatenate([np.full(len(boxes), -1), np.arange(len(corners))])
+    boxes, owner = np.concatenate([boxes, around]), np.concatenate([owner, oblique])
+    order = np.argsort(owner, kind="stable")
+    boxes, owner, place = boxes[order], owner[order], place[order]
     first = np.searchsorted(owner, np.arange(len(bounds) + 1))
     count = np.diff(first)[models]
     objects = np.repeat(np.arange(len(bounds)), count)
     row = places_of(first[models], count)
     shift = bounds[objects, 0] - bounds[models[objects], 0]
-    return (boxes[row] + shift[:, None]).astype(np.int32), objects
+    rows = np.flatnonzero(place[row] >= 0)
+    plans = corners[place[row[rows]], :, :2] + shift[rows, None, :2]
+    return (boxes[row] + shift[:, None]).astype(np.int32), Plans(rows, plans.astype(np.int32)), objects
+
+
+def _yaws(triangles: np.ndarray, owners: np.ndarray, count: int) -> np.ndarray:
+    """How each object stands off the axes [degrees], 0 where it hardly does, shape (count,)."""
+    starts, yaw = np.searchsorted(owners, np.arange(count + 1)), np.zeros(count)
+    for number in np.unique(owners):
+        own = triangles[starts[number] : starts[number + 1]].astype(float)
+        own -= own.min(axis=(0, 1))
+        yaw[number] = wall_yaw([(own.reshape(-1, 3), np.arange(3 * len(own)).reshape(-1, 3))], SNAPPED_DEG)
+    return np.where(np.abs(yaw) < OBLIQUE_DEG, 0.0, yaw)
+
+
+def _cut_turned(
+    triangles: np.ndarray, owners: np.ndarray, yaw: np.ndarray, least: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pieces of objects in their own frames: corners of each plan, z low and high in turn, shape (n, 4, 3); objects."""
+    corners, owner = [np.zeros((0, 4, 3), np.int64)], [np.zeros(0, np.int64)]
+    for number in np.unique(owners):
+        own = triangles[owners == number].astype(np.int64)
+        # Cut about its own corner, so that what is alike is cut alike.
+        base = own.min(axis=(0, 1))
+        own -= base
+        level = np.round(turned(own.astype(float), -yaw[number])).astype(np.int64)
+        bounds = np.array([[level.min(axis=(0, 1)), level.max(axis=(0, 1))]])
+        boxes, _ = _cut(level, np.zeros(len(own), np.int64), bounds, least)
+        corners.append(np.array([_tight_plan(own, box, yaw[number]) for box in boxes], np.int64) + base)
+        owner.append(np.full(len(boxes), number))
+    return np.concatenate(corners), np.concatenate(owner)
+
+
+def _tight_plan(triangles: np.ndarray, box: np.ndarray, yaw_deg: float) -> np.ndarray:
+    """Corners of an upright prism that holds what lies of the triangles in a box of a turned frame, shape (4, 3).
+
+    Its corners are those of the object where it has some there: what is a step larger sticks out of the wall that the
+    object ends in.
+    """
+    x, y = (box[:, axis] + np.array([-ROUNDING, ROUNDING]) for axis in (0, 1))
+    frame = np.column_stack([x[[0, 1, 1, 0]], y[[0, 0, 1, 1]], box[[0, 0, 1, 1], 2]])
+    wide = np.round(turned(frame.astype(float), yaw_deg)).astype(np.int64)
+    vertices = np.unique(triangles.reshape(-1, 3)[:, :2], axis=0)
+    points = _plan_points(triangles, box[:, :2] + np.array([[-1], [1]]), yaw_deg)
+    away = np.abs(vertices[None] - wide[:, None, :2]).max(axis=2)
+    nearest = away.argmin(axis=1)
+    tight = away.min(axis=1) <= 2 * ROUNDING + 1
+    for chosen in (tight & np.array(some) for some in FEWER_CORNERS):
+        plan = np.where(chosen[:, None], vertices[nearest], wide[:, :2])
+        along = np.roll(plan, -1, axis=0) - plan
+        bend = np.roll(along, -1, axis=0)
+        if (along[:, 0] * bend[:, 1] <= along[:, 1] * bend[:, 0]).any():
+            continue
+        rest = points[:, None] - plan
+        inward = along[:, 0] * rest[:, :, 1] - along[:, 1] * rest[:, :, 0]
+        if (inward >= -1e-6 * np.abs(along).sum(axis=1)).all():
+            break
+    return np.column_stack([plan, wide[:, 2]])
+
+
+def _plan_points(triangles: np.ndarray, rectangle: np.ndarray, yaw_deg: float) -> np.ndarray:
+    """Points whose convex hull holds the triangles' plan inside a rectangle (low, high) of a turned frame, (n, 2)."""
+    flat = turned(triangles.astype(float), -yaw_deg)[:, :, :2]
+    low, high = rectangle.astype(float)
+    near = ((flat.min(axis=1) <= high) & (flat.max(axis=1) >= low)).all(axis=1)
+    flat, own = flat[near], triangles[near].reshape(-1, 3)[:, :2].astype(float)
+    inside = ((flat >= low) & (flat <= high)).all(axis=2).ravel()
+    crossings = []
+    for k in range(3):
+        a, b = flat[:, k], flat[:, (k + 1) % 3]
+        for axis in (0, 1):
+            rise = b[:, axis] - a[:, axis]
+            for border in (low[axis], high[axis]):
+                share = np.divide(border - a[:, axis], rise, out=np.full(len(a), -1.0), where=rise != 0)
+                point = a + share[:, None] * (b - a)
+                held = (share >= 0) & (share <= 1) & (point >= low - 1).all(axis=1) & (point <= high + 1).all(axis=1)
+                crossings.append(point[held])
+    # Corners of the rectangle that a triangle lies under or over.
+    for corner in np.array([low, [high[0], low[1]], high, [low[0], high[1]]]):
+        edges = np.roll(flat, -1, axis=1) - flat
+        rest = corner - flat
+        turn = edges[:, :, 0] * rest[:, :, 1] - edges[:, :, 1] * rest[:, :, 0]
+        if ((turn >= 0).all(axis=1) | (turn <= 0).all(axis=1)).any():
+            crossings.append(corner[None])
+    return np.concatenate([own[inside], turned(_lifted(np.concatenate(crossings)), yaw_deg)[:, :2]])
+
+
+def _lifted(points: np.ndarray) -> np.ndarray:
+    """Plan points with a height of 0, shape (n, 3)."""
+    return np.column_stack([points, np.zeros(len(points))])
 
 
 def _models(triangles: np.ndarray, owners: np.ndarray, bounds: np.ndarray) -> np.ndarray:

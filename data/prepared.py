@@ -9,7 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from .blockers import Blockers, find_blockers
+from .blockers import Blockers, find_blockers, join_blockers
+from .curtains import find_curtains
 from .graph import CellGraph
 from .occludees import Occludees, find_occludees
 from .opaque import NO_PLANES, OpaquePlanes, opaque_planes
@@ -20,6 +21,8 @@ from .solids import closed_elements
 
 # Smaller pieces of furniture hide little and would fill the hierarchy of blockers.
 BLOCKING_DETAIL_M2 = 0.1
+# Closed elements with less are not cut at an angle.
+CURTAIN_M2 = 1.0
 # Oblique surfaces below this hide little, and are not made of triangles below the share.
 PATCH_M2 = 1.0
 PATCH_SHARE = 1 / 32
@@ -84,6 +87,18 @@ class PreparedModel:
         ahead, first = np.searchsorted(owners[large], found.owner), np.searchsorted(owners, found.owner)
         found.members = [large[a + held] - f for a, f, held in zip(ahead, first, found.members, strict=True)]
         return found
+
+    @cached_property
+    def curtains(self) -> Blockers:
+        """Upright rectangles at any angle, inside closed elements or on faces."""
+        solids, least = [triangles for _, triangles in self.closed], CURTAIN_M2 / self.scene.grid_m**2
+        large = [t for t in solids if _flat_area(np.ptp(t, axis=(0, 1))[None])[0] >= least]
+        return find_curtains(large, self.scene.triangles(*OPAQUE)[0], self.scene.grid_m)
+
+    @cached_property
+    def walls(self) -> Blockers:
+        """What the search of lines may branch on: rectangles of regions, then curtains."""
+        return join_blockers([self.regions.blockers, self.curtains])
 
     @cached_property
     def outlines(self) -> Patches:

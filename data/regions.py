@@ -24,6 +24,10 @@ THIN_M = 0.6
 ROUND_M2 = 2.0
 # Steps of the staircase along an oblique outline of a section.
 SECTION_STEPS = 4
+# Steps along an outline on a level: slabs of turned wings reach to the middle of the walls on them.
+LEVEL_STEPS = 24
+# Normals that rise, or lean off an axis, by less than this do not count.
+UPRIGHT = 1e-3
 # An oblique section of more triangles than this is left out: it costs more than it hides.
 SECTION_TRIANGLES = 200
 
@@ -162,6 +166,10 @@ class _Sections:
         faces = np.stack([size[:, OTHER_AXES[axis]].prod(axis=1) for axis in range(3)], axis=1)
         straight = np.array([((_normals(t) != 0).sum(axis=1) == 1).all() for t in self._triangles], bool)
         self._large = (faces >= least_round) | straight[:, None]
+        # What stands at an angle is cut along its own faces (data/curtains.py); along the axes it gives staircases.
+        oblique = np.array([_stands_oblique(t) for t in self._triangles], bool)
+        self._large[oblique, :2] = False
+        self._large[:, 2] &= ~oblique | (size[:, 2] < size[:, :2].min(axis=1))
         self._middle = self._boxes.sum(axis=1) // 2
         self._heights: dict[tuple[int, int], np.ndarray] = {}
         self._cut: dict[tuple[int, int, int], tuple[np.ndarray, bool]] = {}
@@ -218,6 +226,15 @@ class _Sections:
         if (element, axis) not in self._heights:
             self._heights[element, axis] = np.unique(self._triangles[element][:, :, axis])
         return self._heights[element, axis]
+
+
+def _stands_oblique(triangles: np.ndarray) -> bool:
+    """Whether most upright faces of an element are on neither plan axis."""
+    normals = _normals(triangles).astype(float)
+    size = np.linalg.norm(normals, axis=1)
+    upright = np.abs(normals[:, 2]) <= UPRIGHT * size
+    oblique = upright & (np.abs(normals[:, :2]).min(axis=1) > UPRIGHT * size)
+    return bool(size[oblique].sum() > 0.5 * size[upright].sum())
 
 
 def _is_box(triangles: np.ndarray) -> bool:
@@ -278,5 +295,6 @@ def section_rectangles(cut: np.ndarray, axis: int, k: int, *, below: bool) -> np
     kept = (edges[:, 0] != edges[:, 1]).any(axis=1)
     if not kept.any():
         return np.zeros((0, 2, 2), np.int64)
-    rectangles, _, _ = edge_rectangles(edges[kept], SECTION_STEPS, rounded=rounded[kept], anywhere=True)
+    steps = LEVEL_STEPS if axis == 2 else SECTION_STEPS
+    rectangles, _, _ = edge_rectangles(edges[kept], steps, rounded=rounded[kept], anywhere=True)
     return rectangles.astype(np.int64)

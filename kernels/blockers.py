@@ -11,15 +11,33 @@ slab between two storeys ends a search at its root.
 import warp as wp
 
 from ..data.blockers import Blockers
+from ..data.store import certificates
+from .curtains import (
+    CURTAIN_WAYS,
+    FIRST_COMPOSITE,
+    FIRST_CURTAIN,
+    append_curtain_way,
+    crosses,
+    has_curtain_way,
+    rises,
+    stops,
+)
+from .ends import CORNERS, Ends, append_corner, append_order, end_missed, has_corner, plan_times
+from .fences import FENCE_WAYS, FIRST_FENCE, append_fence_way, fence_met, fence_of
 from .graph import reflect_high, reflect_low
 from .launch import CPU, Device, node_columns
-from .stab import LIST_CAPACITY, append_entry, vec6i
+from .stab import LIST_CAPACITY, vec6i
 
 f64 = wp.float64
 
 # Ways to miss a blocker: past one of its four sides, or by entering the target before its plane, or by leaving the
 # source after it. The last two exist only where the plane cuts through the target or the source.
 WAYS = wp.constant(6)
+# What a node may be about instead of a blocker: FIRST_MISS + how an end's plan is missed.
+FIRST_MISS = wp.constant(certificates.FIRST_MISS)
+# Lookups that found nothing, and one whose line meets a curtain that no row says how to miss.
+CLEAR = wp.constant(-1)
+DOUBTFUL = wp.constant(-2)
 
 
 @wp.struct
@@ -32,18 +50,6 @@ class BlockerTree:
     node_lo: wp.array[wp.vec3i]
     node_hi: wp.array[wp.vec3i]
     links: wp.array[wp.vec2i]
-
-
-@wp.struct
-class Ends:
-    """Source and target of a search, mirrored so that every component of a line's direction is positive."""
-
-    s_lo: wp.vec3d
-    s_hi: wp.vec3d
-    t_lo: wp.vec3d
-    t_hi: wp.vec3d
-    octant: int
-    strict: int
 
 
 @wp.func
@@ -140,17 +146,37 @@ def cuts_target(plane: f64, t_lo: f64, strict: int) -> bool:
 
 
 @wp.func
+def curtain_share(lo: wp.vec3d, hi: wp.vec3d, time: f64, w: wp.vec3d, xi: wp.vec3d, ends: Ends) -> wp.vec4d:
+    """As `shares`, of a curtain taken for a rectangle across the axis that it is least extended on."""
+    axis = int(0)
+    if hi[1] - lo[1] < hi[0] - lo[0]:
+        axis = 1
+    point = wp.vec3d((time + xi[0]) / w[0], (time + xi[1]) / w[1], (time + xi[2]) / w[2])
+    flat = wp.vec3d(lo[0], lo[1], lo[2])
+    flat[axis] = f64(0.5) * (lo[axis] + hi[axis])
+    return shares(flat, hi, axis, point, ends)
+
+
+@wp.func
 def scan(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2i:
     """The strongest blocker that the line crosses between leaving source and entering target, and its sides' order.
 
-    Exact for integer w: every crossing time is an integer multiple of 1/4. Touching an edge counts as crossing.
-    Returns (-1, 0) if the line is clear.
+    Exact for integer w: every crossing time is an integer multiple of 1/4. Touching an edge of an axial blocker counts
+    as crossing. Returns (CLEAR, 0) if the line is clear, (DOUBTFUL, 0) if curtains are all that it may cross, and it
+    satisfies some way to miss each.
     """
     out = w[0] * ends.s_hi[0] - xi[0]
     leave = wp.min(out, wp.min(w[1] * ends.s_hi[1] - xi[1], w[2] * ends.s_hi[2] - xi[2]))
     into = w[0] * ends.t_lo[0] - xi[0]
     enter = wp.max(into, wp.max(w[1] * ends.t_lo[1] - xi[1], w[2] * ends.t_lo[2] - xi[2]))
-    best = wp.vec2i(-1, 0)
+    # When it leaves and enters the plans, to look for curtains that lie within the boxes around them.
+    leave_plan = leave
+    if ends.s_oblique == 1:
+        leave_plan = wp.min(leave, plan_times(ends.s_plan, ends.turn, w, xi)[1] - f64(1.0e-6))
+    enter_plan = enter
+    if ends.t_oblique == 1:
+        enter_plan = wp.max(enter, plan_times(ends.t_plan, ends.turn, w, xi)[0] + f64(1.0e-6))
+    best = wp.vec2i(CLEAR, 0)
     best_strength = f64(-100.0)
     node = int(0)
     count = tree.links.shape[0]
@@ -160,23 +186,38 @@ def scan(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2i:
         hi = reflect_high(tree.node_lo[node], tree.node_hi[node], ends.octant)
         first = wp.max(w[0] * lo[0] - xi[0], wp.max(w[1] * lo[1] - xi[1], w[2] * lo[2] - xi[2]))
         last = wp.min(w[0] * hi[0] - xi[0], wp.min(w[1] * hi[1] - xi[1], w[2] * hi[2] - xi[2]))
-        if first <= last and first <= enter and last >= leave and (ends.strict == 0 or first < enter):
+        if first <= last and first <= enter_plan and last >= leave_plan and (ends.strict == 0 or first < enter_plan):
             if link[1] >= 0:
                 axis = tree.axis[link[1]]
-                time = w[axis] * lo[axis] - xi[axis]
-                # A flat box that a line with no zero component meets is crossed at one time, and first == last == time.
-                if time >= leave:
-                    point = wp.vec3d((time + xi[0]) / w[0], (time + xi[1]) / w[1], (time + xi[2]) / w[2])
-                    share = shares(lo, hi, axis, point, ends)
-                    value = strength(share)
-                    # A plane that cuts source or target leaves two more ways to miss the blocker.
-                    if lo[axis] < ends.s_hi[axis] or cuts_target(lo[axis], ends.t_lo[axis], ends.strict):
-                        value -= f64(3.0)
-                    if value > best_strength:
-                        best_strength = value
-                        best = wp.vec2i(link[1], side_order(share))
-                        if value >= f64(20.0):
-                            return best
+                value = f64(-200.0)
+                share = wp.vec4d()
+                if axis < FIRST_CURTAIN:
+                    time = w[axis] * lo[axis] - xi[axis]
+                    # A flat box that a line with no zero component meets is crossed at one time: first, last, time.
+                    if time >= leave and first <= enter and (ends.strict == 0 or first < enter):
+                        point = wp.vec3d((time + xi[0]) / w[0], (time + xi[1]) / w[1], (time + xi[2]) / w[2])
+                        share = shares(lo, hi, axis, point, ends)
+                        value = strength(share)
+                        # A plane that cuts source or target leaves two more ways to miss the blocker.
+                        if lo[axis] < ends.s_hi[axis] or cuts_target(lo[axis], ends.t_lo[axis], ends.strict):
+                            value -= f64(3.0)
+                else:
+                    rising = rises(axis, ends.octant)
+                    if stops(lo, hi, rising, ends, w, xi, leave, enter):
+                        share = curtain_share(lo, hi, f64(0.5) * (first + last), w, xi, ends)
+                        value = strength(share)
+                        if first <= leave or last >= enter:
+                            value -= f64(3.0)
+                    elif axis < FIRST_COMPOSITE and best[0] == CLEAR:
+                        if crosses(lo, hi, rising, w, xi, leave_plan, enter_plan):
+                            best = wp.vec2i(DOUBTFUL, 0)
+                if value > best_strength:
+                    best_strength = value
+                    best = wp.vec2i(link[1], side_order(share))
+                    if axis >= FIRST_CURTAIN:
+                        best[1] = 0
+                    if value >= f64(20.0):
+                        return best
             node += 1
         else:
             node = link[0]
@@ -184,19 +225,16 @@ def scan(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2i:
 
 
 @wp.func
-def append_order(work: wp.array[f64], lists: int, counts: vec6i, i: int, first: f64, j: int, second: f64) -> vec6i:
-    """The row "plane x_i = first is crossed before plane x_j = second": xi_i - xi_j >= w_i first - w_j second."""
-    p = int(0)
-    if i + j == 3:
-        p = 2
-    if i + j == 2:
-        p = 4
-    if i > j:
-        p += 1
-    append_entry(work, lists, p, counts[p], first, second)
-    out = counts
-    out[p] = out[p] + 1
-    return out
+def look_up(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2i:
+    """What a node with this line is about: an end that it misses, or else as `scan`."""
+    miss = end_missed(ends, w, xi)
+    if miss >= 0:
+        return wp.vec2i(FIRST_MISS + miss, 0)
+    if ends.s_oblique + ends.t_oblique > 0:
+        fence = fence_met(ends, w, xi)
+        if fence >= 0:
+            return wp.vec2i(FIRST_FENCE + fence, 0)
+    return scan(tree, ends, w, xi)
 
 
 @wp.func
@@ -257,8 +295,8 @@ def has_room(counts: vec6i) -> bool:
 
 
 @wp.func
-def has_way(cursor: int, plane: f64, axis: int, ends: Ends) -> bool:
-    """Whether way `cursor` to miss a blocker exists: four sides always, the other two where its plane cuts a box."""
+def has_side(cursor: int, plane: f64, axis: int, ends: Ends) -> bool:
+    """Whether way `cursor` to miss a rectangle exists: four sides, the others where its plane cuts a box."""
     if cursor == 4:
         return cuts_target(plane, ends.t_lo[axis], ends.strict)
     if cursor == 5:
@@ -267,7 +305,34 @@ def has_way(cursor: int, plane: f64, axis: int, ends: Ends) -> bool:
 
 
 @wp.func
-def append_way(
+def way_count(tree: BlockerTree, item: int) -> int:
+    """Ways of a node that is about an item, whether they exist or not."""
+    if item >= FIRST_MISS:
+        return CORNERS
+    if item >= FIRST_FENCE:
+        return FENCE_WAYS
+    if tree.axis[item] >= FIRST_CURTAIN:
+        return CURTAIN_WAYS
+    return WAYS
+
+
+@wp.func
+def has_way(tree: BlockerTree, item: int, cursor: int, ends: Ends) -> bool:
+    """Whether way `cursor` to miss a blocker, or to meet a missed plan, exists."""
+    if item >= FIRST_MISS:
+        return has_corner(ends, item - FIRST_MISS, cursor)
+    if item >= FIRST_FENCE:
+        return True
+    lo = reflect_low(tree.lo[item], tree.hi[item], ends.octant)
+    axis = tree.axis[item]
+    if axis >= FIRST_CURTAIN:
+        hi = reflect_high(tree.lo[item], tree.hi[item], ends.octant)
+        return has_curtain_way(lo, hi, rises(axis, ends.octant), cursor, ends)
+    return has_side(cursor, lo[axis], axis, ends)
+
+
+@wp.func
+def append_sides(
     work: wp.array[f64],
     lists: int,
     counts: vec6i,
@@ -278,7 +343,7 @@ def append_way(
     cursor: int,
     ends: Ends,
 ) -> vec6i:
-    """The rows of way `cursor` to miss a blocker: a side, and short of the sides before it in `order`, or beyond it."""
+    """The rows of way `cursor` to miss a rectangle: a side, short of the sides before it in `order`; or beyond it."""
     out = counts
     if cursor < 4:
         for earlier in range(cursor + 1):
@@ -289,6 +354,23 @@ def append_way(
     else:
         out = append_beyond(work, lists, out, lo[axis], axis, ends.s_hi, False)
     return out
+
+
+@wp.func
+def append_way(
+    work: wp.array[f64], lists: int, counts: vec6i, tree: BlockerTree, item: int, order: int, cursor: int, ends: Ends
+) -> vec6i:
+    """The rows of way `cursor` to miss a blocker, or to meet a missed plan."""
+    if item >= FIRST_MISS:
+        return append_corner(work, lists, counts, ends, item - FIRST_MISS, cursor)
+    if item >= FIRST_FENCE:
+        return append_fence_way(work, lists, counts, fence_of(ends, item - FIRST_FENCE), cursor)
+    lo = reflect_low(tree.lo[item], tree.hi[item], ends.octant)
+    hi = reflect_high(tree.lo[item], tree.hi[item], ends.octant)
+    axis = tree.axis[item]
+    if axis >= FIRST_CURTAIN:
+        return append_curtain_way(work, lists, counts, lo, hi, rises(axis, ends.octant), cursor, ends)
+    return append_sides(work, lists, counts, lo, hi, axis, order, cursor, ends)
 
 
 def blocker_tree(blockers: Blockers, device: Device = CPU) -> BlockerTree:

@@ -14,11 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ..data.plans import Plans
 from ..data.ragged import places_of, starts_of
 from ..data.store import certificates
 from ..data.verdict import Verdict
-from .blockers import BlockerTree, Ends, has_room
+from .blockers import BlockerTree, has_room
 from .directions import POLYGON_SIZE, det_sign, edge_cut
+from .ends import Ends, Pairs, can_lead, ends_of
 from .launch import CPU, Device, Scratch, launch_slots
 from .stab import LEVEL_SIZE, load_counts, slope_cut
 from .target import (
@@ -28,11 +30,8 @@ from .target import (
     MAX_BRANCHES,
     SLOT_SIZE,
     STACK_SIZE,
-    Pairs,
     Slot,
-    can_lead,
     device_pairs,
-    ends_of,
     next_way,
     open_node,
     slot_at,
@@ -48,7 +47,7 @@ CUT_STEP = wp.constant(1 << 24)
 # A node's word is NODE_STEP times its blocker plus the order of its sides.
 NODE_STEP = wp.constant(certificates.NODE_STEP)
 # Words of a node at most, with those of its leaves; and those of eight octants without a node.
-NODE_WORDS, ROOT_WORDS = 1 + 6 * 3, 8 * 3
+NODE_WORDS, ROOT_WORDS = 1 + 10 * 3, 8 * 3
 # Words that the trees of one launch may have, so that a long list of pairs needs no more memory than a short one.
 MOST_WORDS = 1 << 26
 
@@ -244,7 +243,13 @@ class LineTrees:
 
 
 def launch_line_trees(
-    tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, nodes: np.ndarray, *, device: Device = CPU
+    tree: BlockerTree,
+    boxes: np.ndarray,
+    rows: np.ndarray,
+    nodes: np.ndarray,
+    *,
+    plans: Plans | None = None,
+    device: Device = CPU,
 ) -> LineTrees:
     """Certificates of pairs that the target search called hidden.
 
@@ -253,6 +258,7 @@ def launch_line_trees(
         boxes: as of `launch_target_search`.
         rows: hidden rows of that search, shape (n, 3), int.
         nodes: lines that it tried for each of them, shape (n,), int.
+        plans: as of that search.
         device: where to.
 
     Returns:
@@ -266,7 +272,7 @@ def launch_line_trees(
     begin = 0
     while begin < len(rows):
         count = max(1, int(np.searchsorted(np.cumsum(room[begin:]), MOST_WORDS, side="right")))
-        part = _write_part(tree, boxes, rows[begin : begin + count], room[begin : begin + count], device)
+        part = _write_part(tree, boxes, rows[begin : begin + count], room[begin : begin + count], plans, device)
         sizes.append(part[0])
         words.append(part[1])
         begin += count
@@ -274,13 +280,13 @@ def launch_line_trees(
 
 
 def _write_part(
-    tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, room: np.ndarray, device: Device
+    tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, room: np.ndarray, plans: Plans | None, device: Device
 ) -> tuple[np.ndarray, np.ndarray]:
     """Number of words of each row's tree, and all words; row i may use room[i]."""
     starts = starts_of(room)
     words = wp.empty(int(starts[-1]), dtype=int, device=device.name)
     sizes = device.zeros(len(rows), int)
-    inputs = [tree, device_pairs(boxes, rows, device), device.array(starts, wp.int64)]
+    inputs = [tree, device_pairs(boxes, rows, device, plans), device.array(starts, wp.int64)]
     launch_slots(_write, len(rows), inputs, Scratch(int(SLOT_SIZE), int(STACK_SIZE)), [words, sizes], device)
     used = np.maximum(sizes.numpy(), 0).astype(np.int64)
     return used, words.numpy()[places_of(starts[:-1], used)]

@@ -11,15 +11,18 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ..data.plans import NO_PLANS, Plans
 from ..data.verdict import Verdict
-from .blockers import WAYS, BlockerTree, Ends, append_way, has_room, has_way, scan
-from .graph import reflect_high, reflect_low
-from .launch import CPU, Device, Scratch, launch_slots
+from .blockers import CLEAR, DOUBTFUL, BlockerTree, append_way, has_room, has_way, look_up, way_count
+from .directions import POLYGON_SIZE
+from .ends import Ends, Pairs, can_lead, ends_of, start_directions
+from .launch import CPU, Device, Scratch, check_coordinates, launch_slots
 from .stab import (
     AT_W,
     LEVEL_SIZE,
     LIST_CAPACITY,
     LISTS_SIZE,
+    SLOPES_SIZE,
     SPARES_SIZE,
     append_box,
     append_entry,
@@ -29,7 +32,6 @@ from .stab import (
     load_counts,
     offsets,
     slot_size,
-    start_level,
     store_counts,
     vec6i,
 )
@@ -50,15 +52,6 @@ STACK_SIZE = wp.constant((MAX_BRANCHES + 2) * FRAME)
 # Answers beside the verdicts: every way of a node has been tried; the search of a pair has to end.
 EXHAUSTED = wp.constant(3)
 GIVEN_UP = wp.constant(4)
-
-
-@wp.struct
-class Pairs:
-    """Boxes, and rows (source box, target box, strict) to join; strict leaves out blockers at the target's face."""
-
-    lo: wp.array[wp.vec3i]
-    hi: wp.array[wp.vec3i]
-    rows: wp.array[wp.vec3i]
 
 
 @wp.struct
@@ -94,31 +87,16 @@ def slot_at(number: int) -> Slot:
 
 
 @wp.func
-def ends_of(pairs: Pairs, row: int, octant: int) -> Ends:
-    """Ends of a row, mirrored for an octant."""
-    pair = pairs.rows[row]
-    out = Ends()
-    out.s_lo = reflect_low(pairs.lo[pair[0]], pairs.hi[pair[0]], octant)
-    out.s_hi = reflect_high(pairs.lo[pair[0]], pairs.hi[pair[0]], octant)
-    out.t_lo = reflect_low(pairs.lo[pair[1]], pairs.hi[pair[1]], octant)
-    out.t_hi = reflect_high(pairs.lo[pair[1]], pairs.hi[pair[1]], octant)
-    out.octant = octant
-    out.strict = pair[2]
-    return out
-
-
-@wp.func
-def can_lead(ends: Ends) -> bool:
-    """Whether a line in the ends' octant can lead from the source to the target."""
-    return ends.t_hi[0] > ends.s_lo[0] and ends.t_hi[1] > ends.s_lo[1] and ends.t_hi[2] > ends.s_lo[2]
-
-
-@wp.func
 def start_search(ends: Ends, slot: Slot, work: wp.array[f64], frames: wp.array[int]) -> int:
     """Decide the lines from source to target at level 1, blockers aside, and put their rows into frame 0."""
     counts = append_box(work, slot.lists, vec6i(), ends.s_lo, ends.s_hi, -1)
     counts = append_box(work, slot.lists, counts, ends.t_lo, ends.t_hi, -1)
-    start_level(work, slot.levels)
+    if start_directions(ends, work, slot.levels, slot.spare) == Verdict.HIDDEN:
+        # As `decide` reports slopes that leave no direction; the level is the one that it would have written.
+        for k in range(SLOPES_SIZE):
+            work[slot.levels + LEVEL_SIZE + k] = work[slot.levels + k]
+        work[slot.spare + 2 * POLYGON_SIZE + 3] = f64(-2.0)
+        return Verdict.HIDDEN
     store_counts(frames, slot.stack + AT_COUNTS, counts)
     return decide(work, slot.lists, slot.levels, slot.levels + LEVEL_SIZE, slot.spare, vec6i(), counts)
 
@@ -127,9 +105,9 @@ def start_search(ends: Ends, slot: Slot, work: wp.array[f64], frames: wp.array[i
 def open_node(
     tree: BlockerTree, ends: Ends, depth: int, slot: Slot, work: wp.array[f64], frames: wp.array[int]
 ) -> wp.vec2i:
-    """Look up what the line of a decided node crosses, as `scan`, and put it into the node's frame."""
+    """Look up what a decided node is about, as `look_up`, and put it into the node's frame."""
     level = slot.levels + (depth + 1) * LEVEL_SIZE
-    hit = scan(tree, ends, direction(work, level), offsets(level_maxima(work, level)))
+    hit = look_up(tree, ends, direction(work, level), offsets(level_maxima(work, level)))
     at = slot.stack + depth * FRAME
     frames[at] = hit[0]
     frames[at + 1] = 0
@@ -139,24 +117,22 @@ def open_node(
 
 @wp.func
 def next_way(tree: BlockerTree, ends: Ends, depth: int, slot: Slot, work: wp.array[f64], frames: wp.array[int]) -> int:
-    """Decide the next way that exists to miss a node's blocker, as its child: a verdict, or EXHAUSTED.
+    """Decide the next way that exists out of what a node is about, as its child: a verdict, or EXHAUSTED.
 
     The child's level is that of depth + 2, its rows are in the frame of depth + 1.
     """
     at = slot.stack + depth * FRAME
     level = slot.levels + (depth + 1) * LEVEL_SIZE
-    blocker = frames[at]
-    lo = reflect_low(tree.lo[blocker], tree.hi[blocker], ends.octant)
-    hi = reflect_high(tree.lo[blocker], tree.hi[blocker], ends.octant)
-    axis = tree.axis[blocker]
+    item = frames[at]
+    ways = way_count(tree, item)
     counts = load_counts(frames, at + AT_COUNTS)
     cursor = int(frames[at + 1])
-    while cursor < WAYS and not has_way(cursor, lo[axis], axis, ends):
+    while cursor < ways and not has_way(tree, item, cursor, ends):
         cursor += 1
     frames[at + 1] = cursor + 1
-    if cursor >= WAYS:
+    if cursor >= ways:
         return EXHAUSTED
-    grown = append_way(work, slot.lists, counts, lo, hi, axis, frames[at + 2], cursor, ends)
+    grown = append_way(work, slot.lists, counts, tree, item, frames[at + 2], cursor, ends)
     store_counts(frames, at + FRAME + AT_COUNTS, grown)
     return decide(work, slot.lists, level, level + LEVEL_SIZE, slot.spare, counts, grown)
 
@@ -182,7 +158,7 @@ def widen(ends: Ends, clearance: f64, counts: vec6i, slot: Slot, work: wp.array[
         for k in range(2, counts[p]):
             at = slot.lists + (p * LIST_CAPACITY + k) * 2
             append_entry(work, roomy, p, k, work[at] + clearance, work[at + 1] - clearance)
-    start_level(work, slot.levels)
+    start_directions(ends, work, slot.levels, slot.spare)
     return decide(work, roomy, slot.levels, slot.levels + LEVEL_SIZE, slot.spare, vec6i(), counts)
 
 
@@ -208,8 +184,8 @@ def write_witness(
             wide = slot.levels + LEVEL_SIZE
             w_wide = direction(work, wide)
             xi_wide = offsets(level_maxima(work, wide))
-            hit = scan(tree, ends, w_wide, xi_wide)
-            if hit[0] < 0:
+            hit = look_up(tree, ends, w_wide, xi_wide)
+            if hit[0] == CLEAR:
                 w = w_wide
                 xi = xi_wide
                 clearance = f64(0.0)
@@ -242,7 +218,9 @@ def search_octant(
             fresh = False
             answers_out.nodes[row] = answers_out.nodes[row] + 1
             hit = open_node(tree, ends, depth, slot, work, frames)
-            if hit[0] < 0:
+            if hit[0] == DOUBTFUL:
+                return GIVEN_UP
+            if hit[0] == CLEAR:
                 level = slot.levels + (depth + 1) * LEVEL_SIZE
                 # An unrounded direction makes crossing times inexact: kept, but not called a witness.
                 if work[level + AT_W] != wp.floor(work[level + AT_W]):
@@ -313,14 +291,23 @@ class TargetAnswers:
     offset: np.ndarray
 
 
-def device_pairs(boxes: np.ndarray, rows: np.ndarray, device: Device) -> Pairs:
+def device_pairs(boxes: np.ndarray, rows: np.ndarray, device: Device, plans: Plans | None = None) -> Pairs:
     """Boxes and rows, as of `launch_target_search`, on a device."""
     lo, hi = (device.corners(boxes[:, side]) for side in (0, 1))
-    return device.struct(Pairs, lo=lo, hi=hi, rows=rows)
+    plans = plans or NO_PLANS
+    check_coordinates(plans.corners)
+    plan_of = plans.places(len(boxes))
+    return device.struct(Pairs, lo=lo, hi=hi, plan_of=plan_of, plans=plans.corners, rows=rows)
 
 
 def launch_target_search(
-    tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, *, cap: int = 2000, device: Device = CPU
+    tree: BlockerTree,
+    boxes: np.ndarray,
+    rows: np.ndarray,
+    *,
+    plans: Plans | None = None,
+    cap: int = 2000,
+    device: Device = CPU,
 ) -> TargetAnswers:
     """Whether an open set of sightlines leads from box to box past every blocker.
 
@@ -329,6 +316,7 @@ def launch_target_search(
         boxes: [grid steps], shape (m, 2, 3), int32, |coordinate| <= 2**24.
         rows: (source box, target box, strict), shape (n, 3), int. Source and target must not overlap. With strict 1 a
             blocker that lies on the target's near face does not count (the target is a surface, not a cell).
+        plans: of those boxes that stand for prisms inside them; lines count only if they meet the prisms' plans.
         cap: lines tried per pair before the answer is UNKNOWN.
         device: where to.
 
@@ -343,5 +331,5 @@ def launch_target_search(
     count = len(rows)
     answers = device.struct(Answers, verdict=count, nodes=count, octant=count, line=count, offset=count)
     scratch = Scratch(int(SLOT_SIZE), int(STACK_SIZE))
-    launch_slots(_search, count, [tree, device_pairs(boxes, rows, device), cap], scratch, [answers], device)
+    launch_slots(_search, count, [tree, device_pairs(boxes, rows, device, plans), cap], scratch, [answers], device)
     return TargetAnswers(*(getattr(answers, name).numpy() for name in TargetAnswers.__dataclass_fields__))

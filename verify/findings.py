@@ -141,15 +141,17 @@ class VerifyResult:
 
 def count_pairs(bake: "BakeFolder", caster: Caster | None = None) -> list[Counts]:
     """Pairs by class of targets: inhabitable cells, other cells, objects; with what a caster's rays saw, if given."""
-    inhabitable = bake.graph.inhabitable
+    # Nothing is claimed of cells from, or to, view cells with a plan.
+    tiles = np.arange(bake.graph.cell_count) < bake.graph.tile_count
+    inhabitable = bake.graph.inhabitable & tiles
     tables = (
         []
         if not bake.claims_cells
         else [
-            (name, bake.potential_cells[:, chosen], bake.cell_to_cell, "reached_cell_id", chosen)
+            (name, bake.potential_cells[tiles][:, chosen], bake.cell_to_cell, "reached_cell_id", chosen)
             for name, chosen in (
                 ("cells, inhabitable", inhabitable),
-                ("cells, wall, sliver and exterior", ~inhabitable),
+                ("cells, wall, sliver and exterior", ~inhabitable & tiles),
             )
         ]
     )
@@ -162,6 +164,7 @@ def count_pairs(bake: "BakeFolder", caster: Caster | None = None) -> list[Counts
         if caster is not None:
             marks = caster.seen_objects if target == "object_id" else caster.seen_cells
             own = caster.potential_objects if target == "object_id" else caster.potential_cells
-            by_rays = int(((marks > 0) & own)[:, slice(None) if chosen is None else chosen].sum())
+            rows = slice(None) if chosen is None else tiles[caster.sources]
+            by_rays = int(((marks > 0) & own)[rows][:, slice(None) if chosen is None else chosen].sum())
         counts.append(Counts(name, int(potential.sum()), seen, by_rays))
     return counts

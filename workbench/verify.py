@@ -161,7 +161,7 @@ def make_caster(
     if not len(sources):
         return None, dark
     potential = claims[0][sources]
-    links = judge.links if judge.lines is None else contact_links(bake.graph.cells)
+    links = judge.links if judge.lines is None else contact_links(bake.graph.tiles.cells, bake.graph.cell_count)
     caster = Caster(
         sources=sources,
         spots=[own for own in spots if len(own)],
@@ -248,19 +248,17 @@ def _blocks(rows: int, total: int) -> list[list[tuple[int, int]]]:
 def _hunt(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, progress: bool, result: VerifyResult) -> None:
     """Rays that look where an omission is likeliest, and random ones that bound what is missed."""
     start, sources = time.perf_counter(), caster.sources
-    cells = {}
-    if bake.claims_cells:
-        cells = {"claimed_cells": bake.potential_cells[sources], "cells": bake.graph.cells}
     falsifier = Falsifier(
         boxes=bake.graph.cells[sources],
+        plans=bake.graph.plans.take(sources, bake.graph.cell_count),
         spots=caster.spots,
         claimed=bake.potential_objects[sources],
         opaque=caster.opaque,
         glass=caster.glass,
         lines=judge.lines,
         hints=certificate_hints(bake, sources) if has_certificates(bake) else None,
+        cells=(bake.graph.cells, bake.potential_cells[sources]) if bake.claims_cells else None,
         seed=caster.seed,
-        **cells,
     )
     with tqdm(total=rays, unit="ray", unit_scale=True, desc="guided", disable=not progress) as bar:
         for found, state in falsifier.batches(rays):

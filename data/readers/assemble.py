@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import InputError
+from ..frame import wall_yaw
 from ..scene import GRID_LIMIT, Definition, Instance, Mesh, Role, Scene, Space, degenerate, snap, turned
-from .frame import wall_yaw
 
 MAX_COORDINATE_M = 1.0e9
 # Strays are at most this share of the parts, and further off than this, and than so many times the others reach.

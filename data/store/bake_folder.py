@@ -1,7 +1,11 @@
-"""The bake folder, format 1: the display database that others read. Parquet (zstd) and JSON only.
+"""The bake folder: the display database that others read. Parquet (zstd) and JSON only.
 
 Metres, relative to `origin`, Z up, right-handed. Rows exist for inhabitable cells; a row that is absent means HIDDEN.
 A witness is the sightline from `origin_*` to `origin_* + direction_*`.
+
+Format 2 has view cells with a `plan` (x, y of four corners, counter-clockwise) after all others in cells.parquet: such
+a cell is the upright prism over its plan, not the box around it, and only its objects are claimed. A bake without such
+cells is format 1.
 """
 
 import json
@@ -18,7 +22,7 @@ from ..graph import OTHER_AXES, CellGraph
 from ..rows import Rows
 from ..scene import Scene
 from ..verdict import Verdict
-from .graph_folder import CELL_COLUMNS, PORTAL_COLUMNS, read_graph
+from .graph_folder import CELL_COLUMNS, PORTAL_COLUMNS, plan_column, read_graph
 from .scene_folder import new_folder, read_manifest, read_table
 from .scene_tables import meshes_table, objects_table, scene_from_tables
 
@@ -106,11 +110,14 @@ class BakeFolder:
     def potential_cells(self) -> np.ndarray:
         """Potentially visible cells, shape (cells, cells), bool; rows of inhabitable cells only.
 
-        All of them in a bake that claims nothing of cells.
+        All of them in a bake that claims nothing of cells, and from or to view cells with a plan.
         """
         if not self.claims_cells:
             return np.repeat(self.graph.inhabitable[:, None], self.graph.cell_count, axis=1)
-        return self._matrix(self.cell_to_cell, "reached_cell_id", self.graph.cell_count)
+        out = self._matrix(self.cell_to_cell, "reached_cell_id", self.graph.cell_count)
+        beside = np.arange(self.graph.cell_count) >= self.graph.tile_count
+        out[:, beside], out[beside & self.graph.inhabitable] = self.graph.inhabitable[:, None], True
+        return out
 
     @cached_property
     def potential_objects(self) -> np.ndarray:
@@ -239,6 +246,10 @@ def cells_table(graph: CellGraph, grid_m: float) -> pa.Table:
     columns |= {name: pa.array(values[:, i]) for i, name in enumerate(CELL_COLUMNS[1:])}
     columns["inhabitable"] = pa.array(graph.inhabitable)
     columns["name"] = pa.array([str(name) for name in graph.cell_names], pa.string())
+    if len(graph.plans.rows):
+        beside = np.arange(graph.cell_count) >= graph.tile_count
+        corners = graph.plans.filled(graph.cell_count, np.arange(graph.cell_count))
+        columns["plan"] = plan_column(corners, beside, grid_m)
     return pa.table(columns)
 
 

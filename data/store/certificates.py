@@ -2,9 +2,9 @@
 
 | table | columns |
 |---|---|
-| proofs.parquet | proof_id, cell_id, closed, min_x ... max_z: no sightline leads from the cell into this box; `closed`: nor onto its faces, which is what hides objects |
+| proofs.parquet | proof_id, cell_id, closed, min_x ... max_z, plan: no sightline leads from the cell into this box, or into the prism in it over a plan (x, y of four corners, counter-clockwise; null for none); `closed`: nor onto its faces, which is what hides objects |
 | trees.parquet | proof_id, words (list<int32>): a line tree, see below |
-| blockers.parquet | blocker_id, axis, coordinate, min_u, min_v, max_u, max_v: rectangles that line trees name |
+| blockers.parquet | blocker_id, axis, coordinate, min_u, min_v, max_u, max_v, top: rectangles that line trees name. Axis 3 and 4 are curtains: upright over the segment from (min_u, min_v) to (max_u, max_v) of the plan, or for 4 from (min_u, max_v) to (max_u, min_v), from height `coordinate` to `top` |
 | leaves.parquet | proof_id, occluder_id, v_min_x ... v_max_z, x_min_x ... x_max_z: the occluder blocks all segments from box v to box x; the leaves of a proof tile (cell, box) |
 | occluders.parquet | occluder_id, kind (region, patch), axis and coordinate of a region, its rectangles (list: min_u, min_v, max_u, max_v, ...), object_id of a patch, the corners of its outline (list: x, y, z, ...), and the triangles of its disc (list: places among those of the object, degenerate ones not counted) |
 
@@ -23,10 +23,28 @@ cell and box through every axis before it leaves them through any other (a = low
   enters the box before the plane through the other two axes (k + 1, then k + 2); this way exists if c > low_k of the box,
   for a closed one also if c = low_k. Way 5: it leaves the cell after the plane through the other two; if c < high_k of the
   cell.
+- A node about a curtain has these ways; A is its end with the least x, B the other one, and its plan box reaches from (x, y) to
+  (u, v) after mirroring, its heights from z to t. Left of A and of B: y_A before x_A, y_B before x_B. Right of both: the same
+  turned round. Then right of A and left of B, and one of: under (x and y before z), over (t before u and v), in the target
+  before (low_0 before v, low_1 before u, low_2 before u and v), out of the source after (y before high_0, x before high_1,
+  x and y before high_2). For a curtain that rises after mirroring the same four, left of A and right of B. The last two of
+  four do not exist if the target's plan lies wholly on the far side of AB (for a closed one with at most one corner on
+  it), or the source's on the near side, or where a row names one axis twice and cannot hold.
+- A node of blocker 2**23 - 4 + m says that the line is left (m even) or right (m odd) of the plan of the source (m < 2) or the
+  target. Its ways are past one of the plan's corners on the other side, and not past those before it; corners that
+  another one is always passed with do not count.
+- A node of blocker 2**23 - 4100 + n is about a piece of a side of a plan: n = p + 256 (entry + 2 e), e as in a tag 5 + 8 e. With m
+  the greatest power of 2 up to p + 1, the piece reaches from (p + 1 - m) / m of the side to (p + 3 - m) / m. After mirroring, a line through the
+  side out of the prism (into it, with entry) has one end of the piece on its left hand, A, and one on its right, B; where
+  they are off the grid A is (x up, y down) and B (x down, y up). Ways: left of A; right of A and of B; right of A, left of B,
+  and out: low_2 of the prism before the piece's plan box, rounded out, is left on either axis; in: the plan box entered on both
+  axes before high_2.
 - A word < 0 is a leaf: -1 - tag - 2**24 n, followed by n words -1 - tag. A tag names a cycle of rows: cycle + 8 (p + 128 (q
   + 128 r)). Cycles 0 to 4 run through the axes 0 1, 1 2, 0 2, 0 1 2 and 0 2 1; p, q, r count the rows of each pair of
   axes on the way from the root. Adding the rows of a cycle leaves g . w < 0, and these cuts contradict each other: with
-  weights >= 0 they add up to a g that is nowhere negative.
+  weights >= 0 they add up to a g that is nowhere negative. A tag 5 + 8 e names an edge instead, from corner e of the source's
+  plan or e - 4 of the target's to the next one, that parts the two plans: of its normal n towards the target (after
+  mirroring) the cut says n_y w_x + n_x w_y > 0, as past that edge a sightline goes that way.
 """  # noqa: E501 (a table row is one line)
 
 from dataclasses import dataclass, replace
@@ -35,11 +53,13 @@ import numpy as np
 import pyarrow as pa
 
 from ..blockers import Blockers
+from ..curtains import COMPOSITE, RISING
 from ..graph import OTHER_AXES
 from ..opaque import decompose
 from ..patches import Patches
 from ..ragged import starts_of
 from ..regions import Regions
+from .graph_folder import plan_column
 
 TABLES = ("proofs", "trees", "blockers", "leaves", "occluders")
 CORNERS = ("min_x", "min_y", "min_z", "max_x", "max_y", "max_z")
@@ -50,6 +70,13 @@ LEAVES = ("proof_id", "occluder_id", *(f"v_{name}" for name in CORNERS), *(f"x_{
 OCCLUDERS = ("occluder_id", "kind", "axis", "coordinate", "rectangles", "object_id", "corners", "triangles")
 # A node of a line tree holds its blocker times this.
 NODE_STEP = 256
+# In place of a blocker: with it begin the numbers of the four ways to miss an end's plan.
+FIRST_MISS = (1 << 23) - 4
+# Before them: pieces of the sides of the ends' plans, at most so many for each of 16 sides and senses.
+FENCES = 256
+FIRST_FENCE = FIRST_MISS - 16 * FENCES
+# In place of a cycle: the cut of an edge of a plan.
+PARTING = 5
 
 
 @dataclass
@@ -60,6 +87,7 @@ class Proofs:
         cell: view cell of each proof, shape (n,), int64.
         boxes: what is hidden from it, whatever lies inside [grid steps], shape (n, 2, 3), int32.
         closed: whether sightlines that end on the box's faces are hidden too, shape (n,), bool.
+        plan: corners of the prisms that are meant instead of boxes, shape (n, 4, 2), int32; all 0 for none.
         word_starts: words of proof i are words[word_starts[i]:word_starts[i + 1]], shape (n + 1,), int64.
         words: of line trees, int32.
         leaf_starts: likewise of leaves.
@@ -74,6 +102,7 @@ class Proofs:
     words: np.ndarray
     leaf_starts: np.ndarray
     leaves: np.ndarray
+    plan: np.ndarray
     seconds: float = 0.0
 
     def take(self, chosen: np.ndarray) -> "Proofs":
@@ -87,6 +116,7 @@ class Proofs:
             self.words[np.repeat(chosen, sizes)],
             starts_of(leaves[chosen]),
             self.leaves[np.repeat(chosen, leaves)],
+            self.plan[chosen],
             self.seconds,
         )
 
@@ -105,6 +135,7 @@ def join_proofs(parts: list[Proofs]) -> Proofs:
         np.concatenate([part.words for part in parts]),
         starts_of(np.concatenate([np.diff(part.leaf_starts) for part in parts])),
         np.concatenate([part.leaves for part in parts]),
+        np.concatenate([part.plan for part in parts]),
         sum(part.seconds for part in parts),
     )
 
@@ -117,6 +148,7 @@ NO_PROOFS = Proofs(
     np.zeros(0, np.int32),
     np.zeros(1, np.int64),
     np.zeros((0, 13), np.int32),
+    np.zeros((0, 4, 2), np.int32),
 )
 
 
@@ -136,6 +168,8 @@ def certificate_tables(
     corners = proofs.boxes.reshape(-1, 6) * grid_m
     columns = {"proof_id": ids, "cell_id": proofs.cell.astype(np.int32), "closed": proofs.closed}
     columns |= {name: corners[:, i] for i, name in enumerate(CORNERS)}
+    if proofs.plan.any():
+        columns["plan"] = plan_column(proofs.plan, proofs.plan.any(axis=(1, 2)), grid_m)
     sizes = np.diff(proofs.word_starts)
     words = pa.ListArray.from_arrays(pa.array(starts_of(sizes[sizes > 0]).astype(np.int32)), pa.array(proofs.words))
     nodes = proofs.words[proofs.words >= 0]
@@ -149,13 +183,19 @@ def certificate_tables(
 
 
 def _blockers_table(used: np.ndarray, blockers: Blockers, grid_m: float) -> pa.Table:
-    axis = blockers.axis[used]
+    used = used[used < len(blockers.axis)]
+    # Whether a curtain has smaller pieces is of no interest to a checker.
+    kind = np.where(blockers.axis[used] >= COMPOSITE, blockers.axis[used] - COMPOSITE + RISING, blockers.axis[used])
+    axis = np.where(kind >= RISING, 2, kind)
     uv = OTHER_AXES[axis] if len(used) else np.zeros((0, 2), int)
     rows = np.arange(len(used))
     boxes = blockers.boxes[used] * grid_m
     values = [boxes[rows, 0, axis], *(boxes[rows, side, uv[:, c]] for side in (0, 1) for c in (0, 1))]
-    columns = {"blocker_id": used.astype(np.int32), "axis": axis.astype(np.int8)}
-    return pa.table(columns | dict(zip(BLOCKERS[2:], values, strict=True)))
+    columns = {"blocker_id": used.astype(np.int32), "axis": kind.astype(np.int8)}
+    columns |= dict(zip(BLOCKERS[2:], values, strict=True))
+    if (kind >= RISING).any():
+        columns["top"] = boxes[rows, 1, axis]
+    return pa.table(columns)
 
 
 def _leaf_tables(

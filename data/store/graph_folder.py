@@ -7,10 +7,12 @@ import pyarrow as pa
 
 from ..errors import InputError
 from ..graph import OTHER_AXES, CellGraph
+from ..plans import NO_PLANS, Plans
 from ..scene import GRID_LIMIT, GRID_M
 from .scene_folder import read_table
 
 CELL_COLUMNS = ("cell_id", "min_x", "min_y", "min_z", "max_x", "max_y", "max_z")
+PLAN_TYPE = pa.list_(pa.float64())
 PORTAL_COLUMNS = ("portal_id", "cell_a", "cell_b", "axis", "coordinate", "min_u", "max_u", "min_v", "max_v")
 
 
@@ -64,9 +66,53 @@ def read_graph(
     flat = numbers(rows, PORTAL_COLUMNS[4:], portals_path)
     _check_ids(ends, len(ids), portals_path)
     boxes, portals_moved = _snap(_portal_boxes(ends[:, 2], flat), grid_m, portals_path)
-    graph = CellGraph(cells, inhabitable, names, ends[:, :2].astype(np.int32), ends[:, 2].astype(np.int8), boxes)
+    plans = _plans(table, cells, grid_m, cells_path, order)
+    axis = ends[:, 2].astype(np.int8)
+    graph = CellGraph(cells, inhabitable, names, ends[:, :2].astype(np.int32), axis, boxes, plans)
     check_graph(graph, str(folder), disjoint=disjoint)
     return graph, max(moved, portals_moved)
+
+
+def plan_column(corners: np.ndarray, planned: np.ndarray, grid_m: float) -> pa.Array:
+    """The column `plan`: x, y of four corners [m], counter-clockwise; null where a box is all there is.
+
+    Args:
+        corners: [grid steps], shape (n, 4, 2), int.
+        planned: rows that have a plan, shape (n,), bool.
+        grid_m: grid step [m].
+    """
+    metres = corners.reshape(len(corners), -1) * grid_m
+    return pa.array([row if some else None for row, some in zip(metres.tolist(), planned, strict=True)], PLAN_TYPE)
+
+
+def _plans(table: pa.Table, cells: np.ndarray, grid_m: float, path: Path, order: np.ndarray) -> Plans:
+    """Plans of the cells of a table, which come last.
+
+    Raises:
+        InputError: one is not four corners of a convex plan, counter-clockwise, that touches its box on every side; or
+            a cell without a plan follows one that has it.
+    """
+    column = optional_column(table, "plan", None)[order]
+    rows = np.array([n for n, plan in enumerate(column) if plan is not None], np.int64)
+    if not len(rows):
+        return NO_PLANS
+    if not np.array_equal(rows, np.arange(len(cells) - len(rows), len(cells))):
+        raise InputError(f"{path}: expected cells with a plan after all others, found one before cell {rows[0] + 1}")
+    try:
+        metres = np.array(list(column[rows]), float).reshape(-1, 4, 2)
+    except (ValueError, TypeError):
+        raise InputError(f"{path}: expected plans of four corners, found another number of coordinates") from None
+    corners = np.round(metres / grid_m).astype(np.int64)
+    along = np.roll(corners, -1, axis=1) - corners
+    turn = along[:, :, 0] * np.roll(along, -1, axis=1)[:, :, 1] - along[:, :, 1] * np.roll(along, -1, axis=1)[:, :, 0]
+    around = np.stack([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    bad = np.flatnonzero((turn <= 0).any(axis=1) | (around != cells[rows][:, :, :2]).any(axis=(1, 2)))
+    if len(bad):
+        raise InputError(
+            f"{path}: expected convex plans, counter-clockwise, that touch their box on every side, "
+            f"found another in cell {rows[bad[0]]}"
+        )
+    return Plans(rows, corners.astype(np.int32))
 
 
 def optional_column(table: pa.Table, name: str, default: object) -> np.ndarray:
@@ -128,7 +174,7 @@ def check_graph(graph: CellGraph, where: str, *, disjoint: bool = True) -> None:
     flat = np.flatnonzero((graph.cells[:, 1] <= graph.cells[:, 0]).any(axis=1))
     if len(flat):
         raise InputError(f"{where}: expected cells with min below max, found cell {flat[0]} without volume")
-    pair = first_overlap(graph.cells) if disjoint else None
+    pair = first_overlap(graph.tiles.cells) if disjoint else None
     if pair is not None:
         raise InputError(
             f"{where}: expected cells that do not overlap, found cells {pair[0]} and {pair[1]} overlapping"

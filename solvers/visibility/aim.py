@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...data.plans import NO_PLANS, Plans
 from ...data.prepared import PreparedModel
 from ...data.rows import Rows
 from ...data.scene import OPAQUE
@@ -28,6 +29,7 @@ class Sights:
         targets: triangles of all objects.
         ranges: first and past-the-last triangle of each object among the targets, shape (objects, 2).
         solids: closed elements by view cell.
+        plans: of view cells that stand at an angle: eyes are inside them.
         seed: of the random sightlines.
         device: that holds triangles and targets.
     """
@@ -38,29 +40,32 @@ class Sights:
     targets: AimTargets
     ranges: np.ndarray
     solids: SolidIndex
+    plans: Plans
     seed: int
     device: Device
 
     @classmethod
-    def of(cls, model: PreparedModel, cells: np.ndarray, seed: int, device: Device) -> "Sights":
+    def of(
+        cls, model: PreparedModel, cells: np.ndarray, seed: int, device: Device, plans: Plans = NO_PLANS
+    ) -> "Sights":
         """Copy a model's triangles to the device."""
         scene, starts = model.scene, model.scene.triangle_starts
         triangles = device_triangles(*scene.triangles(*OPAQUE), device)
         ranges, solids = np.column_stack([starts[:-1], starts[1:]]), SolidIndex(cells, model.closed)
         targets = aim_targets(scene.triangles()[0], device)
-        return cls(model, cells, triangles, targets, ranges, solids, seed, device)
+        return cls(model, cells, triangles, targets, ranges, solids, plans, seed, device)
 
     def from_cells(self, cells: np.ndarray) -> "Sights":
-        """The same from other view cells."""
-        return replace(self, cells=cells, solids=SolidIndex(cells, self.model.closed))
+        """The same from other view cells, which stand along the axes."""
+        return replace(self, cells=cells, plans=NO_PLANS, solids=SolidIndex(cells, self.model.closed))
 
     def outside(self, source: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Points in their view cells that certainly lie outside every solid, shape (n,), bool."""
+        """Points in their cells' boxes that are eyes: within the plan, certainly outside every solid, (n,), bool."""
         free = np.zeros(len(source), bool)
         for cell in np.unique(source):
             rows = np.flatnonzero(source == cell)
             free[rows] = self.solids.outside(points[rows], int(cell))
-        return free
+        return free & self.plans.hold(source, points, len(self.cells))
 
     def clear(self, source: np.ndarray, origin: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Segments that start outside every solid and certainly clear every opaque triangle, shape (n,), bool."""

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...data.plans import NO_PLANS, Plans
 from ...data.ragged import starts_of
 from ...data.store.certificates import NO_PROOFS, Proofs, join_proofs
 from ...data.verdict import Verdict
@@ -31,6 +32,7 @@ class Ledger:
         answers: TargetAnswers,
         device: Device,
         pair: np.ndarray | None = None,
+        plans: Plans | None = None,
     ) -> None:
         """Enter the line trees of what a search hid; what has none becomes UNKNOWN in the answers.
 
@@ -41,16 +43,18 @@ class Ledger:
             answers: of the search.
             device: likewise.
             pair: what each row's target is a piece of, -1 if it is whole, shape (n,); all whole by default.
+            plans: as of `launch_target_search`.
         """
         start = time.perf_counter()
         hidden = np.flatnonzero(answers.verdict == Verdict.HIDDEN)
-        trees = launch_line_trees(tree, boxes, rows[hidden], answers.nodes[hidden], device=device)
+        trees = launch_line_trees(tree, boxes, rows[hidden], answers.nodes[hidden], plans=plans, device=device)
         written = np.diff(trees.starts) > 0
         answers.verdict[hidden[~written]] = Verdict.UNKNOWN
         hidden, starts = hidden[written], np.append(trees.starts[:-1][written], trees.starts[-1])
         none = np.zeros(len(hidden) + 1, np.int64)
         cell, target = rows[hidden, 0].astype(np.int64), boxes[rows[hidden, 1]].astype(np.int32)
-        proofs = Proofs(cell, target, rows[hidden, 2] != 0, starts, trees.words, none, NO_PROOFS.leaves)
+        plan = (plans or NO_PLANS).filled(len(boxes), rows[hidden, 1])
+        proofs = Proofs(cell, target, rows[hidden, 2] != 0, starts, trees.words, none, NO_PROOFS.leaves, plan)
         self._enter(proofs, pair if pair is None else pair[hidden])
         self._seconds += time.perf_counter() - start
 
@@ -62,7 +66,14 @@ class Ledger:
         starts = starts_of(answers.leaves[hidden])
         none, closed = np.zeros(len(hidden) + 1, np.int64), np.ones(len(hidden), bool)
         proofs = Proofs(
-            cell[hidden].astype(np.int64), boxes[hidden], closed, none, NO_PROOFS.words, starts, answers.certificate
+            cell[hidden].astype(np.int64),
+            boxes[hidden],
+            closed,
+            none,
+            NO_PROOFS.words,
+            starts,
+            answers.certificate,
+            NO_PLANS.filled(len(boxes), hidden),
         )
         self._enter(proofs, pair if pair is None else pair[hidden])
 
@@ -90,6 +101,7 @@ def descend(
     items: np.ndarray,
     first_level: int,
     hide: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    clear: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Go down a hierarchy of items from view cells, and give up below every node that is hidden.
 
@@ -100,11 +112,13 @@ def descend(
         items: item of each node of the last level, -1 for none.
         first_level: to start at: the root is visible from everywhere.
         hide: says of cells and boxes, row by row, which boxes are hidden.
+        clear: says of them which boxes the cells do not meet; by default as `apart`.
 
     Returns:
         View cell and item of every pair that is left, ordered, int64: neither the item's box nor one around it is
         hidden.
     """
+    clear = clear or (lambda source, boxes: apart(cells[source], boxes))
     level = min(first_level, len(levels) - 1)
     source = np.repeat(block, 2**level)
     node = np.tile(np.arange(2**level), len(block))
@@ -113,7 +127,7 @@ def descend(
         present = (boxes[:, 0] <= boxes[:, 1]).all(axis=1)
         source, node, boxes = source[present], node[present], boxes[present]
         left = np.ones(len(node), bool)
-        rows = apart(cells[source], boxes)
+        rows = np.flatnonzero(clear(source, boxes))
         left[rows] = ~hide(source[rows], boxes[rows])
         source, node = source[left], node[left]
         if level == len(levels) - 1:
@@ -126,7 +140,7 @@ def descend(
 
 
 def apart(cells: np.ndarray, boxes: np.ndarray) -> np.ndarray:
-    """Rows whose open cell does not meet the closed box."""
+    """Rows whose open cell does not meet the closed box, shape (n,), bool."""
     meet = (cells[:, 0] < boxes[:, 1]) & (cells[:, 1] > boxes[:, 0])
     # A flat box inside the cell has low == high, which lies strictly between the cell's sides.
-    return np.flatnonzero(~(meet[:, 0] & meet[:, 1] & meet[:, 2]))
+    return ~(meet[:, 0] & meet[:, 1] & meet[:, 2])

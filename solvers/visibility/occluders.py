@@ -13,9 +13,9 @@ from functools import partial
 
 import numpy as np
 
-from ...data.blockers import Blockers
-from ...data.hierarchy import build_hierarchy
+from ...data.blockers import Blockers, join_blockers
 from ...data.occludees import Occludees
+from ...data.plans import NO_PLANS, Plans
 from ...data.prepared import no_patches, no_regions
 from ...data.ragged import places_of
 from ...data.rows import Rows
@@ -71,13 +71,12 @@ class OccluderModel:
         """
         model, device = sights.model, sights.device
         regions, patches = (model.regions, model.patches) if shadows else (no_regions(), no_patches())
-        axial = regions.blockers
+        walls = model.walls if shadows else regions.blockers
         if blockers is not None:
-            boxes, axis = np.concatenate([blockers.boxes, axial.boxes]), np.concatenate([blockers.axis, axial.axis])
-            axial = Blockers(boxes, axis, build_hierarchy(boxes))
+            walls = join_blockers([blockers, walls])
         smallest = tuple(round(size / model.scene.grid_m) for size in SMALLEST_M)
         shields = device_shields(regions, patches, device)
-        return cls(sights, model.occludees, blocker_tree(axial, device), shields, smallest)
+        return cls(sights, model.occludees, blocker_tree(walls, device), shields, smallest)
 
     @property
     def cells(self) -> np.ndarray:
@@ -105,7 +104,9 @@ def seen_objects(
         And the certificates, with a ledger.
     """
     occludees, hide = model.occludees, partial(_hide_nodes, model, ledger)
-    rows = Rows.unseen(*descend(model.cells, block, occludees.levels, occludees.objects, FIRST_LEVEL, hide))
+    clear = partial(_clear, model, NO_PLANS)
+    rows = descend(model.cells, block, occludees.levels, occludees.objects, FIRST_LEVEL, hide, clear)
+    rows = Rows.unseen(*rows)
     look_at_objects(model, rows, ())
     return refine_objects(model, rows, aim_rounds, ledger)
 
@@ -143,9 +144,21 @@ def hidden_boxes(
 ) -> np.ndarray:
     """Boxes that no sightline from the view cell of their row reaches, shape (n,), bool; false proves nothing."""
     hidden = np.zeros(len(source), bool)
-    rows = apart(model.cells[source], boxes)
+    rows = np.flatnonzero(apart(model.cells[source], boxes))
     hidden[rows] = _shaft(model, source[rows], boxes[rows], ledger).verdict == Verdict.HIDDEN
     return hidden
+
+
+def _clear(model: OccluderModel, plans: Plans, source: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    """Rows whose view cell does not meet the box, or the prism over its plan, shape (n,), bool."""
+    cells, own = model.cells, model.sights.plans
+    clear = apart(cells[source], boxes)
+    rows = np.flatnonzero(~clear)
+    if len(rows) and len(own.rows) + len(plans.rows):
+        both = Plans.join([(own, len(cells)), (plans, len(boxes))])
+        everything = np.concatenate([cells, boxes])
+        clear[rows] = both.part(len(everything), source[rows], len(cells) + rows, everything)
+    return clear
 
 
 def _hide_nodes(model: OccluderModel, ledger: Ledger | None, source: np.ndarray, boxes: np.ndarray) -> np.ndarray:
@@ -160,13 +173,15 @@ def _search(
     cap: int,
     ledger: Ledger | None = None,
     pair: np.ndarray | None = None,
+    plans: Plans = NO_PLANS,
 ) -> TargetAnswers:
-    """Target search from view cells to boxes, row by row; `pair` as of `Ledger.add_lines`."""
+    """Target search from view cells to boxes, row by row; `pair` as of `Ledger.add_lines`, `plans` of the boxes."""
     rows = np.column_stack([source, len(model.cells) + np.arange(len(boxes)), np.ones(len(boxes), int)])
     everything, device = np.concatenate([model.cells, boxes]), model.sights.device
-    answers = launch_target_search(model.tree, everything, rows, cap=cap, device=device)
+    both = Plans.join([(model.sights.plans, len(model.cells)), (plans, len(boxes))])
+    answers = launch_target_search(model.tree, everything, rows, plans=both, cap=cap, device=device)
     if ledger is not None:
-        ledger.add_lines(model.tree, everything, rows, answers, device, pair)
+        ledger.add_lines(model.tree, everything, rows, answers, device, pair, both)
     return answers
 
 
@@ -202,7 +217,7 @@ def _prove_pieces(model: OccluderModel, rows: Rows, ledger: Ledger | None) -> tu
     while len(active := np.flatnonzero((first < last) & (left_of < OPEN_ENOUGH))):
         sizes = np.minimum(step, last[active] - first[active])
         at, piece = np.repeat(active, sizes), places_of(first[active], sizes)
-        left, hints = _prove_boxes(model, rows.source[pairs[at]], model.occludees.pieces[piece], ledger, pairs[at])
+        left, hints = _prove_pieces_of(model, rows.source[pairs[at]], piece, ledger, pairs[at])
         found.append((pairs[at[left]], piece[left], hints[left]))
         np.add.at(left_of, at[left], 1)
         first[active] += sizes
@@ -210,20 +225,25 @@ def _prove_pieces(model: OccluderModel, rows: Rows, ledger: Ledger | None) -> tu
     return tuple(np.concatenate(column) for column in zip(*found, strict=True))
 
 
-def _prove_boxes(
-    model: OccluderModel, source: np.ndarray, boxes: np.ndarray, ledger: Ledger | None, pair: np.ndarray
+def _prove_pieces_of(
+    model: OccluderModel, source: np.ndarray, piece: np.ndarray, ledger: Ledger | None, pair: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which boxes could not be hidden from the view cell of their row, bool, and a line to each, shape (n, 2, 3)."""
+    """Which pieces could not be hidden from the view cell of their row, bool, and a line to each, shape (n, 2, 3)."""
+    boxes = model.occludees.pieces[piece]
     hints = middles(model.cells[source], boxes)
     left = np.ones(len(source), bool)
-    rows = apart(model.cells[source], boxes)
-    answers = _search(model, source[rows], boxes[rows], PIECE_CAP, ledger, pair[rows])
+    plans = model.occludees.plans.take(piece, len(model.occludees.pieces))
+    rows = np.flatnonzero(_clear(model, plans, source, boxes))
+    own = plans.take(rows, len(piece))
+    answers = _search(model, source[rows], boxes[rows], PIECE_CAP, ledger, pair[rows], own)
     left[rows[answers.verdict == Verdict.HIDDEN]] = False
     lined = np.flatnonzero(answers.verdict == Verdict.VISIBLE)
     at = rows[lined]
     hints[at] = np.stack(segments(answers, lined, model.cells[source[at]], boxes[at]), axis=1)
     # A line past all rectangles that meets no oblique occluder either: there is nothing to prove.
+    # Shafts lead from box to box.
     at = rows[answers.verdict != Verdict.HIDDEN]
+    at = at[apart(model.cells[source[at]], boxes[at])]
     at = at[patches_met(model.shields, hints[at, 0], hints[at, 1], device=model.sights.device)]
     proofs = _shaft(model, source[at], boxes[at], ledger, pair[at])
     hidden = proofs.verdict == Verdict.HIDDEN

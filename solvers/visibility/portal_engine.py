@@ -12,6 +12,7 @@ from ...data.patches import Patches
 from ...data.prepared import PreparedModel
 from ...data.regions import Regions
 from ...data.rows import Rows
+from ...data.store.certificates import join_proofs
 from ...kernels import line_tree, shaft, sightline, target, trace
 from ...kernels.launch import CPU, Device
 from . import aim as aiming
@@ -55,10 +56,11 @@ class PortalEngine:
         """
         self._certify, self._least_unknown = certify, LEAST_UNKNOWN[method]
         self._objects = len(model.scene.objects)
-        self._sights = Sights.of(model, graph.cells, seed, device)
-        self._incidence = populate(model.scene, graph.cells)
-        blockers = model.regions.blockers if certify else model.blockers(graph)
-        self.model = CellModel(graph, blockers, self._sights, seed, device)
+        self._plans, graph_of_tiles = graph.plans, graph.tiles
+        self._sights = Sights.of(model, graph.cells, seed, device, graph.plans)
+        self._incidence = populate(model.scene, graph_of_tiles.cells)
+        blockers = model.walls if certify else model.blockers(graph_of_tiles)
+        self.model = CellModel(graph_of_tiles, blockers, self._sights, seed, device)
 
     @property
     def proof_occluders(self) -> tuple[Blockers, Regions, Patches]:
@@ -82,6 +84,18 @@ class PortalEngine:
 
     def visible(self, block: np.ndarray, *, aim: bool = True) -> Part:
         """As of `Engine`."""
+        beside = block >= self.model.graph.cell_count
+        if beside.any():
+            # View cells with a plan are no part of the graph: occluders alone hide from them.
+            part = self._from_tiles(block[~beside], aim=aim)
+            ledger = Ledger() if self._certify else None
+            objects, proofs = seen_objects(self.occluders, block[beside], aiming.AIM_ROUNDS if aim else (), ledger)
+            joined = None if proofs is None else join_proofs([part.proofs, proofs])
+            return Part(part.cells, Rows.join([part.objects, objects]), joined)
+        return self._from_tiles(block, aim=aim)
+
+    def _from_tiles(self, block: np.ndarray, *, aim: bool) -> Part:
+        """What is visible from cells of the graph."""
         for_cells, for_objects = (cell_search.AIM_ROUNDS, aiming.AIM_ROUNDS) if aim else ((), ())
         ledger = Ledger() if self._certify else None
         cells = cell_rows(self.model, block, for_cells, ledger)
@@ -112,7 +126,8 @@ class PortalEngine:
 
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""
-        return Part(unknown_rows(block, self.model.graph.cell_count), unknown_rows(block, self._objects))
+        count = self.model.graph.cell_count
+        return Part(unknown_rows(block[block < count], count), unknown_rows(block, self._objects))
 
     def join(self, parts: list[Part]) -> tuple[Rows, Rows]:
         """As of `Engine`; cells are made symmetric: A sees B exactly when B sees A."""

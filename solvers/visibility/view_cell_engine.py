@@ -8,6 +8,7 @@ import warp as wp
 from ...data.blockers import Blockers
 from ...data.graph import CellGraph
 from ...data.patches import Patches
+from ...data.plans import NO_PLANS, Plans
 from ...data.prepared import PreparedModel
 from ...data.regions import Regions
 from ...data.rows import Rows
@@ -34,6 +35,7 @@ class ViewCellEngine:
         portal_graph: CellGraph | None = None,
         certify: bool = False,
         vlod: VlodSettings | None = None,
+        plans: Plans = NO_PLANS,
     ) -> None:
         """Copy what visibility needs to the device.
 
@@ -47,18 +49,19 @@ class ViewCellEngine:
             portal_graph: cells and portals of the model.
             certify: call hidden only what has a certificate, and keep it; all methods then hide by occluders alone.
             vlod: how the method "vlod" treats view cells.
+            plans: of view cells that are prisms in their boxes.
         """
         self._certify, self._prepared = certify, model
         self._vlod = vlod if method == "vlod" and not certify else None
         self._objects = len(model.scene.objects)
         blockers = None if portal_graph is None or certify else model.blockers(portal_graph)
-        sights = Sights.of(model, cells, seed, device)
+        sights = Sights.of(model, cells, seed, device, plans)
         self.model = OccluderModel.of(sights, blockers=blockers, shadows=method != "portals" or certify)
 
     @property
     def proof_occluders(self) -> tuple[Blockers, Regions, Patches]:
         """As of `Engine`."""
-        return self._prepared.regions.blockers, self._prepared.regions, self._prepared.patches
+        return self._prepared.walls, self._prepared.regions, self._prepared.patches
 
     def from_cells(self, cells: np.ndarray) -> "ViewCellEngine":
         """The same engine for other view cells [grid steps], shape (n, 2, 3), int32."""

@@ -17,6 +17,8 @@ from builders import random_solids
 def make_honest(folder):
     """A bake in which a wall along an axis and a turned one hide a chair, a post of many pieces, and a pane."""
     turned = trimesh.creation.box([0.2, 5, 4])
+    # It leans, too: no upright rectangle lies in it, and what it hides is proved by shafts.
+    turned.apply_transform(trimesh.transformations.rotation_matrix(0.2, [0, 1, 0]))
     turned.apply_transform(trimesh.transformations.rotation_matrix(0.6, [0, 0, 1]))
     turned.apply_translation([-3, 2, 2])
     meshes = [

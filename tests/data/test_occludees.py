@@ -33,11 +33,21 @@ def test_every_point_of_an_object_lies_in_a_piece_of_it(seed, kind):
     weights = random.dirichlet([1, 1, 1], (len(triangles), 40))
     points = np.einsum("mkc,mcx->mkx", weights, triangles.astype(float))
     for object_id in range(len(scene.objects)):
-        pieces = found.pieces[found.starts[object_id] : found.starts[object_id + 1]]
-        mine = points[owners == object_id].reshape(-1, 3)
+        rows = np.arange(found.starts[object_id], found.starts[object_id + 1])
+        pieces, mine = found.pieces[rows], points[owners == object_id].reshape(-1, 3)
         inside = (mine[:, None] >= pieces[:, 0] - 1e-6) & (mine[:, None] <= pieces[:, 1] + 1e-6)
-        assert inside.all(axis=2).any(axis=1).all()
-        assert (pieces[:, 0] >= found.bounds[object_id, 0]).all() and (pieces[:, 1] <= found.bounds[object_id, 1]).all()
+        inside = inside.all(axis=2)
+        plans = dict(zip(found.plans.rows.tolist(), found.plans.corners.astype(float), strict=True))
+        for column, row in enumerate(rows.tolist()):
+            if row in plans:
+                rest = mine[:, None, :2] - plans[row]
+                along = np.roll(plans[row], -1, axis=0) - plans[row]
+                turn = along[:, 0] * rest[:, :, 1] - along[:, 1] * rest[:, :, 0]
+                inside[:, column] &= (turn >= -1e-6 * np.abs(along).sum(axis=1)).all(axis=1)
+            else:
+                assert (pieces[column, 0] >= found.bounds[object_id, 0]).all()
+                assert (pieces[column, 1] <= found.bounds[object_id, 1]).all()
+        assert inside.any(axis=1).all()
 
 
 def test_an_oblique_wall_does_not_fill_its_box():

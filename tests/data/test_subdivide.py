@@ -373,7 +373,7 @@ def test_a_cell_belongs_to_a_room_that_holds_more_than_half_of_it(axis):
     rooms = [rooms[1], rooms[2], (low, halfway), (np.where(np.arange(3) == axis, halfway, low), high + 1)]
     cells.append(np.array(cells[1]) + 40 * METRE)
     rooms.append((cells[-1][0] - 500, np.where(np.arange(3) == axis, cells[-1][0] + METRE, cells[-1][1] + 500)))
-    # A room that holds half of no cell names the one that holds most of it; these hold another one whole.
+    # Rooms that hold half of no cell name none of those: these hold another one whole.
     for room in (0, -1):
         low, high = rooms[room]
         before = np.where(np.arange(3) == axis, low - 6 * METRE, low)

@@ -147,7 +147,7 @@ def test_building(name, every):
 )
 def test_known_means(name, mean):
     """Of the shared graphs the published ones; of the offices what the exact search finds (in the slow tests)."""
-    graph = shared_graph(name)
+    graph = shared_graph(name).tiles
     engine = GraphEngine(graph, device=Device(threads=2))
     rows = engine.join([engine.visible(np.arange(graph.cell_count))])[0]
     assert round(len(rows.source) / graph.cell_count, 2) == mean

@@ -12,6 +12,7 @@ from viewcell.kernels.blockers import blocker_tree
 from viewcell.kernels.line_tree import launch_line_trees
 from viewcell.kernels.target import MAX_BRANCHES, launch_target_search
 from viewcell.verify.proofs.line_tree import Blocker, hides
+from viewcell.verify.proofs.ways import End
 
 LIMIT = 2**24
 
@@ -151,7 +152,7 @@ def judge(source, target, boxes, strict, cap=20_000, *, certain=True):
     if answers.verdict[0] == Verdict.HIDDEN:
         words = launch_line_trees(tree, ends, rows, answers.nodes).words.tolist()
         blockers = {n: Blocker(int((box[0] == box[1]).argmax()), box.tolist()) for n, box in enumerate(boxes)}
-        assert hides(ends[0].tolist(), ends[1].tolist(), strict, words, blockers), "no proof"
+        assert hides(End(ends[0].tolist()), End(ends[1].tolist()), strict, words, blockers), "no proof"
     return int(answers.verdict[0]), int(answers.nodes[0])
 
 

@@ -15,6 +15,7 @@ from viewcell.kernels.stab_batch import launch_stab
 from viewcell.kernels.target import launch_target_search
 from viewcell.verify.exact.stab import stab
 from viewcell.verify.proofs.line_tree import Blocker, hides
+from viewcell.verify.proofs.ways import End
 
 CAP = 100_000
 # Rows in a list, edges of a polygon of directions, and trials of a decision: enough for the first steps of a search.
@@ -114,7 +115,7 @@ def test_line_trees(decided, small):
             blockers = {n: Blocker(int((box[0] == box[1]).argmax()), box.tolist()) for n, box in enumerate(boxes)}
             if len(trees.words):
                 assert truth == Verdict.HIDDEN
-                assert hides(source.tolist(), target.tolist(), strict, trees.words.tolist(), blockers)
+                assert hides(End(source.tolist()), End(target.tolist()), strict, trees.words.tolist(), blockers)
                 written += 1
             missing += truth == Verdict.HIDDEN and not len(trees.words)
     assert min(written, missing) > 20

@@ -40,11 +40,12 @@ def portal_links(graph: CellGraph) -> Links:
     return _table(graph.cell_count, low, high, axis, rectangles, row)
 
 
-def contact_links(cells: np.ndarray) -> Links:
+def contact_links(cells: np.ndarray, total: int | None = None) -> Links:
     """Links wherever two cells share part of a face, opaque or not: independent of the portals that are under test.
 
     Args:
         cells: boxes [grid steps], shape (cells, 2, 3), int32, that do not overlap.
+        total: number of cells that the links are for; those beyond the boxes given have none.
     """
     found = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)))]
     for axis in range(3):
@@ -60,7 +61,7 @@ def contact_links(cells: np.ndarray) -> Links:
         rectangles = np.stack([low, high], axis=2)[met].reshape(-1, 4)
         found.append((a[met], b[met], np.full(met.sum(), axis), rectangles))
     low, high, axis, rectangles = (np.concatenate(column) for column in zip(*found, strict=True))
-    return _table(len(cells), low, high, axis, rectangles, np.full(len(low), -1))
+    return _table(total or len(cells), low, high, axis, rectangles, np.full(len(low), -1))
 
 
 def _table(

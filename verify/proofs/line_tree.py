@@ -10,39 +10,32 @@ on the border of what a row allows need not be looked at, and every row may be r
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...data.curtains import FALLING, RISING
 from ...data.errors import InputError
 from ...data.scene import OPAQUE
-from ...data.store.certificates import BLOCKERS, CORNERS, NODE_STEP, PROOFS, TABLES, TREES
+from ...data.store.certificates import BLOCKERS, CORNERS, NODE_STEP, PARTING, PROOFS, TABLES, TREES
 from ...data.store.scene_folder import read_table
 from .boxes import in_boxes
 from .certified import EXAMPLES, Certified
+from .curtain import is_opaque
 from .opaque import OpaqueSurfaces
 from .shaft import check_shafts
-from .tables import box_text, corners_of, places_of
+from .tables import box_text, corners_of, places_of, plans_of
+from .ways import Blocker, End, partings, ways_of
 
 if TYPE_CHECKING:
     from ...data.graph import CellGraph
     from ...data.store.bake_folder import BakeFolder
 
-Box = list[list[int]]
 # Rows (i, j, a, b) are kept in a list for each ordered pair of axes; a cycle takes one row of each of its lists.
 LISTS = ((0, 1), (1, 0), (1, 2), (2, 1), (0, 2), (2, 0))
 CYCLES = ((0, 1), (2, 3), (4, 5), (0, 2, 5), (4, 3, 1))
 TAG_BASE, CUT_STEP = 128, 1 << 24
-
-
-@dataclass(frozen=True)
-class Blocker:
-    """A rectangle of an axial plane: the axis, and its flat box."""
-
-    axis: int
-    box: Box
 
 
 def has_certificates(bake: "BakeFolder") -> bool:
@@ -66,6 +59,9 @@ def check_certificates(bake: "BakeFolder") -> Certified:
     cell = places_of(proofs["cell_id"].to_numpy(), np.arange(bake.graph.cell_count), paths["proofs"], "cell_id")
     boxes = corners_of(proofs, CORNERS, bake.grid_m, paths["proofs"]).reshape(-1, 2, 3)
     places_of(ids, ids, paths["proofs"], "proof_id", once=True)
+    plans = plans_of(proofs, bake.grid_m, paths["proofs"])
+    ends = [End(box, plan) for box, plan in zip(boxes.tolist(), plans, strict=True)]
+    sources = cell_ends(bake.graph)
     closed = proofs["closed"].to_numpy(zero_copy_only=False).astype(bool)
     found = Certified(len(ids), made_s=float(bake.manifest.get("certificate_s", 0.0)))
     found.bytes = sum(path.stat().st_size for path in paths.values() if path.exists())
@@ -74,24 +70,32 @@ def check_certificates(bake: "BakeFolder") -> Certified:
     good = check_shafts(bake, surfaces, ids, bake.graph.cells[cell], boxes, found)
     rows = places_of(trees["proof_id"].to_numpy(), ids, paths["trees"], "proof_id", once=True)
     for row, words in zip(rows.tolist(), trees["words"].to_pylist(), strict=True):
-        source = bake.graph.cells[cell[row]].tolist()
-        good[row] = good[row] or hides(source, boxes[row].tolist(), bool(closed[row]), words, blockers)
+        good[row] = good[row] or hides(sources[cell[row]], ends[row], bool(closed[row]), words, blockers)
         found.leaves += sum(word < 0 for word in words)
     found.failed_proofs = int((~good).sum())
     found.tell(f"proof {ids[row]}: cell {cell[row]} x {box_text(boxes[row])}" for row in np.flatnonzero(~good))
-    _check_objects(bake, cell[good & closed], boxes[good & closed], found)
+    _check_objects(bake, cell[good & closed], [ends[row] for row in np.flatnonzero(good & closed)], found)
     if bake.claims_cells:
-        _check_cells(bake, cell[good], boxes[good], found)
+        whole = good & np.array([plan is None for plan in plans], bool)
+        _check_cells(bake, cell[whole], boxes[whole], found)
     found.checked_s = time.perf_counter() - start
     return found
 
 
-def hides(source: Box, target: Box, closed: bool, words: list[int], blockers: dict[int, Blocker]) -> bool:
+def cell_ends(graph: "CellGraph") -> list[End]:
+    """Cells of a graph, with their plans."""
+    ends = [End(box) for box in graph.cells.tolist()]
+    for row, plan in zip(graph.plans.rows.tolist(), graph.plans.corners.tolist(), strict=True):
+        ends[row] = End(ends[row].box, plan)
+    return ends
+
+
+def hides(source: End, target: End, closed: bool, words: list[int], blockers: dict[int, Blocker]) -> bool:
     """Whether a line tree proves that no sightline leads from a cell into a box.
 
     Args:
-        source: low and high corner of the cell [grid steps].
-        target: likewise of the box.
+        source: the cell.
+        target: the box.
         closed: whether a blocker on the box's near face leaves that face in sight.
         words: of the tree.
         blockers: by id, real ones.
@@ -102,10 +106,11 @@ def hides(source: Box, target: Box, closed: bool, words: list[int], blockers: di
     rest = iter(words)
     try:
         for octant in range(8):
-            s, t = mirrored(source, octant), mirrored(target, octant)
-            if all(t[1][i] > s[0][i] for i in range(3)):
-                rows = [[(box[0][i], box[1][j]) for box in (s, t)] for i, j in LISTS]
-                if not _excluded(rest, rows, s, t, closed, blockers, octant):
+            s, t = source.mirrored(octant), target.mirrored(octant)
+            # A sightline leads forwards on every axis. Past an edge that parts the plans it goes towards the target.
+            if all(t.box[1][i] > s.box[0][i] for i in range(3)):
+                rows = [[(end.box[0][i], end.box[1][j]) for end in (s, t)] for i, j in LISTS]
+                if not _excluded(rest, rows, (s, t, closed, octant), blockers, partings(s, t)):
                     return False
     except (StopIteration, LookupError, RecursionError):
         # The tree ends too early, or names rows or blockers that do not exist.
@@ -113,33 +118,31 @@ def hides(source: Box, target: Box, closed: bool, words: list[int], blockers: di
     return next(rest, None) is None
 
 
-def mirrored(box: Box, octant: int) -> Box:
-    """A box after the axes were mirrored on which the octant is negative."""
-    flip = [octant >> i & 1 for i in range(3)]
-    return [[-box[1 - side][i] if flip[i] else box[side][i] for i in range(3)] for side in (0, 1)]
-
-
 def _excluded(
     words: Iterator[int],
     rows: list[list[tuple[int, int]]],
-    s: Box,
-    t: Box,
-    closed: bool,
+    about: tuple[End, End, bool, int],
     blockers: dict[int, Blocker],
-    octant: int,
+    given: dict[int, list[int]],
 ) -> bool:
-    """Whether the next words show that rows exclude all lines of an octant past the blockers; s and t are mirrored."""
+    """Whether the next words show that rows exclude all lines of an octant past the blockers.
+
+    Args:
+        words: that are left.
+        rows: so far.
+        about: mirrored source and target, whether it is closed, and the octant.
+        blockers: by id.
+        given: cuts by tag that hold for all sightlines of the octant.
+    """
     word = next(words)
     if word < 0:
         more, tag = divmod(-1 - word, CUT_STEP)
-        return contradict([_cut(rows, tag), *[_cut(rows, -1 - next(words)) for _ in range(more)]])
+        return contradict([_cut(rows, tag, given), *[_cut(rows, -1 - next(words), given) for _ in range(more)]])
     number, order = divmod(word, NODE_STEP)
-    blocker = blockers[number]
-    k, (low, high) = blocker.axis, mirrored(blocker.box, octant)
-    for way in _ways(k, low, high, [order >> 2 * n & 3 for n in range(4)], s, t, closed):
+    for way in ways_of(number, [order >> 2 * n & 3 for n in range(4)], *about, blockers):
         for i, j, a, b in way:
             rows[LISTS.index((i, j))].append((a, b))
-        done = _excluded(words, rows, s, t, closed, blockers, octant)
+        done = _excluded(words, rows, about, blockers, given)
         for i, j, _, _ in way:
             rows[LISTS.index((i, j))].pop()
         if not done:
@@ -147,28 +150,10 @@ def _excluded(
     return True
 
 
-def _ways(
-    k: int, low: list[int], high: list[int], order: list[int], s: Box, t: Box, closed: bool
-) -> list[list[tuple[int, int, int, int]]]:
-    """Rows (i, j, a, b), x_i = a before x_j = b, of every way to miss a blocker on plane x_k = c; a line takes one."""
-    c, others = low[k], [(k + 1) % 3, (k + 2) % 3]
-    if sorted(order) != [0, 1, 2, 3]:
-        raise LookupError("a side is missing")
-    beyond = []
-    for side in order:
-        u = others[side // 2]
-        # Below the low edge at the plane: the plane comes before the edge. Above the high edge: after it.
-        beyond.append((u, k, high[u], c) if side % 2 else (k, u, c, low[u]))
-    ways = [[*((j, i, b, a) for i, j, a, b in beyond[:n]), beyond[n]] for n in range(4)]
-    if c > t[0][k] or (closed and c == t[0][k]):
-        ways.append([(i, k, t[0][i], c) for i in others])
-    if c < s[1][k]:
-        ways.append([(k, i, c, s[1][i]) for i in others])
-    return ways
-
-
-def _cut(rows: list[list[tuple[int, int]]], tag: int) -> list[int]:
+def _cut(rows: list[list[tuple[int, int]]], tag: int, given: dict[int, list[int]]) -> list[int]:
     """The cut g of a cycle that a tag names: the sum of its rows w_i a - w_j b < xi_i - xi_j is g . w < 0."""
+    if tag % 8 == PARTING:
+        return given[tag]
     cycle, places = CYCLES[tag % 8], tag // 8
     g = [0, 0, 0]
     for p in cycle:
@@ -215,24 +200,40 @@ def _read_blockers(bake: "BakeFolder", surfaces: OpaqueSurfaces | None, found: C
     path = bake.folder / "blockers.parquet"
     table = read_table(path, BLOCKERS)
     corners = corners_of(table, BLOCKERS[2:], bake.grid_m, path)
+    # Curtains reach from their coordinate, which is a height, to this one.
+    tops = corners_of(table, ("top",), bake.grid_m, path)[:, 0] if "top" in table.column_names else corners[:, 0]
     ids, axes = table["blocker_id"].to_numpy(), table["axis"].to_numpy()
     places_of(ids, ids, path, "blocker_id", once=True)
     blockers: dict[int, Blocker] = {}
-    for number, k, (c, u0, v0, u1, v1) in zip(ids.tolist(), axes.tolist(), corners.tolist(), strict=True):
-        if k not in (0, 1, 2):
-            raise InputError(f"{path}: expected an axis from 0 to 2, found {k}")
-        rectangle = np.array([[[u0, v0], [u1, v1]]])
-        if surfaces is None:
-            real = graph_blocks(bake.graph, k, c, rectangle[0])
+    rows = zip(ids.tolist(), axes.tolist(), corners.tolist(), tops.tolist(), strict=True)
+    for number, k, (c, u0, v0, u1, v1), top in rows:
+        if k not in (0, 1, 2, RISING, FALLING):
+            raise InputError(f"{path}: expected an axis from 0 to 2 or a curtain's {RISING} or {FALLING}, found {k}")
+        if k < RISING:
+            blocker = Blocker(k, [[*p[:k], c, *p[k:]] for p in ([u0, v0], [u1, v1])])
         else:
-            real = surfaces.open_rectangle(k, c, rectangle) is None
-        if real:
-            blockers[number] = Blocker(k, [[*p[:k], c, *p[k:]] for p in ([u0, v0], [u1, v1])])
+            blocker = Blocker(k, [[u0, v0, c], [u1, v1, top]])
+        if _is_real(blocker, bake, surfaces):
+            blockers[number] = blocker
         else:
             found.failed_occluders += 1
-            told = f"blocker {number}: {box_text(rectangle[0])} of plane {c} of axis {k} does not block"
+            told = (
+                f"blocker {number}: {box_text(blocker.box)}, {('x', 'y', 'z', 'rising', 'falling')[k]}, does not block"
+            )
             found.tell([told] if found.failed_occluders <= EXAMPLES else [])
     return blockers
+
+
+def _is_real(blocker: Blocker, bake: "BakeFolder", surfaces: OpaqueSurfaces | None) -> bool:
+    """Whether a blocker is in the model, or in a bare graph."""
+    k, (low, high) = blocker.axis, blocker.box
+    if k >= RISING:
+        a, b = ([low[0], low[1]], [high[0], high[1]]) if k == RISING else ([low[0], high[1]], [high[0], low[1]])
+        return surfaces is not None and is_opaque(surfaces, [a, b], low[2], high[2])
+    rectangle = np.array([[*corner[:k], *corner[k + 1 :]] for corner in (low, high)])
+    if surfaces is None:
+        return graph_blocks(bake.graph, k, low[k], rectangle)
+    return surfaces.open_rectangle(k, low[k], rectangle[None]) is None
 
 
 def graph_blocks(graph: "CellGraph", axis: int, plane: int, rectangle: np.ndarray) -> bool:
@@ -261,28 +262,39 @@ def _check_cells(bake: "BakeFolder", cell: np.ndarray, boxes: np.ndarray, found:
     found.tell(f"cell {a}, cell {b}: hidden, but in no box of a proof that holds" for a, b in bad)
 
 
-def _check_objects(bake: "BakeFolder", cell: np.ndarray, boxes: np.ndarray, found: Certified) -> None:
-    """Count the hidden pairs (cell, object) whose triangles lie in boxes of proofs."""
+def _check_objects(bake: "BakeFolder", cell: np.ndarray, ends: list[End], found: Certified) -> None:
+    """Count the hidden pairs (cell, object) whose triangles lie in boxes, or prisms, of proofs."""
     if bake.scene is None:
         return
     triangles, starts = bake.scene.triangles()[0], bake.scene.triangle_starts
     bounds, present = bake.scene.object_bounds(), np.diff(starts) > 0
-    known: dict[tuple[int, bytes], bool] = {}
+    boxes = np.array([end.box for end in ends], np.int64).reshape(-1, 2, 3)
+    whole = np.array([end.plan is None for end in ends], bool)
+    known: dict[tuple[int, tuple[int, ...]], bool] = {}
     bad = []
+    names = {end: n for n, end in enumerate({_name(end): end for end in ends})}
+    numbers = np.array([names[_name(end)] for end in ends], np.int64)
     for source in np.flatnonzero(bake.graph.inhabitable):
         hidden = np.flatnonzero(~bake.potential_objects[source] & present)
-        own = np.unique(boxes[cell == source], axis=0)
+        mine = np.flatnonzero(cell == source)
         for target in hidden.tolist():
             low, high = bounds[target]
-            if ((own[:, 0] <= low) & (own[:, 1] >= high)).all(axis=1).any():
+            holds = (boxes[mine, 0] <= low).all(axis=1) & (boxes[mine, 1] >= high).all(axis=1)
+            if (holds & whole[mine]).any():
                 continue
-            near = own[((own[:, 0] <= high) & (own[:, 1] >= low)).all(axis=1)]
-            key = target, near.tobytes()
+            near = mine[((boxes[mine, 0] <= high) & (boxes[mine, 1] >= low)).all(axis=1)]
+            key = target, tuple(sorted(set(numbers[near].tolist())))
             if key not in known:
-                known[key] = in_boxes(triangles[starts[target] : starts[target + 1]].astype(np.int64), near)
+                own = triangles[starts[target] : starts[target + 1]].astype(np.int64)
+                known[key] = in_boxes(own, [ends[row] for row in near])
             if not known[key]:
                 bad.append((source, target))
         found.covered += len(hidden)
     found.covered -= len(bad)
     found.uncovered += len(bad)
     found.tell(f"cell {a}, object {b}: hidden, but not all of it in boxes of proofs that hold" for a, b in bad)
+
+
+def _name(end: End) -> str:
+    """What tells two ends apart."""
+    return f"{end.box} {end.plan}"

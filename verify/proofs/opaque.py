@@ -178,13 +178,14 @@ class OpaqueSurfaces:
         return self._known[key]
 
     def _surface(self, axis: int, plane: int) -> list[Edge]:
-        """Boundary of the triangles of a plane, all turned counter-clockwise, without edges that cancel."""
+        """Boundary of the triangles of a plane."""
         flat = self._triangles[(self._triangles[:, :, axis] == plane).all(axis=1)]
-        chain: Counter[Edge] = Counter()
-        for a, b, c in np.delete(flat, axis, axis=2).tolist():
-            corners = [tuple(a), tuple(b), tuple(c)] if turn(a, b, c) > 0 else [tuple(a), tuple(c), tuple(b)]
-            chain.update(zip(corners, corners[1:] + corners[:1], strict=True))
-        return [(a, b) for (a, b), count in chain.items() for _ in range(count - chain.get((b, a), 0))]
+        return flat_boundary(np.delete(flat, axis, axis=2))
+
+    def reaching(self, box: np.ndarray) -> list[np.ndarray]:
+        """Triangles of each object that shares a point with a box, shape (2, 3)."""
+        near = ((self._boxes[:, 0] <= box[1]) & (self._boxes[:, 1] >= box[0])).all(axis=1)
+        return [self._parts[part] for part in np.flatnonzero(near)]
 
     def disc(self, object_id: int, places: list[int]) -> np.ndarray | None:
         """Triangles of an opaque object, shape (n, 3, 3), int64; None if it has not all of them, or repeats one."""
@@ -200,6 +201,15 @@ def closed(triangles: np.ndarray) -> bool:
     edges = np.concatenate([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 6)
     opposite = edges[:, [3, 4, 5, 0, 1, 2]]
     return bool((edges[np.lexsort(edges.T)] == opposite[np.lexsort(opposite.T)]).all())
+
+
+def flat_boundary(triangles: np.ndarray) -> list[Edge]:
+    """Boundary of triangles of a plane, all turned counter-clockwise, without edges that cancel; shape (n, 3, 2)."""
+    chain: Counter[Edge] = Counter()
+    for a, b, c in triangles.tolist():
+        corners = [tuple(a), tuple(b), tuple(c)] if turn(a, b, c) > 0 else [tuple(a), tuple(c), tuple(b)]
+        chain.update(zip(corners, corners[1:] + corners[:1], strict=True))
+    return [(a, b) for (a, b), count in chain.items() for _ in range(count - chain.get((b, a), 0))]
 
 
 def section(triangles: np.ndarray, axis: int, plane: int, *, below: bool) -> list[Edge]:

@@ -35,6 +35,30 @@ def corners_of(table: pa.Table, columns: tuple[str, ...], grid_m: float, where: 
     return out
 
 
+def plans_of(table: pa.Table, grid_m: float, where: object) -> list[list[list[int]] | None]:
+    """The column `plan` in grid steps: four corners for each row, None where there is none.
+
+    Raises:
+        InputError: as `steps_of`, or a plan is not convex and counter-clockwise.
+    """
+    if "plan" not in table.column_names:
+        return [None] * table.num_rows
+    plans: list[list[list[int]] | None] = []
+    for row in table["plan"].to_pylist():
+        if not row:
+            plans.append(None)
+            continue
+        if len(row) != 8:
+            raise InputError(f"{where}: expected a plan of four corners, found {len(row)} numbers")
+        corners = steps_of(np.array(row, float), grid_m, where).reshape(4, 2).tolist()
+        for k in range(4):
+            (ax, ay), (bx, by), (cx, cy) = corners[k - 2], corners[k - 1], corners[k]
+            if (bx - ax) * (cy - by) - (by - ay) * (cx - bx) <= 0:
+                raise InputError(f"{where}: expected a convex plan, counter-clockwise, found {corners}")
+        plans.append(corners)
+    return plans
+
+
 def steps_of(metres: np.ndarray, grid_m: float, where: object) -> np.ndarray:
     """Grid steps of coordinates that lie on the grid, int64.
 

@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 
 from ...data.graph import CellGraph
+from ..exact.plan import inside_plans
 from ..exact.segment import BLOCKED as THROUGH
 from ..exact.segment import crossing_time, meets_flat_box
 from ..exact.sightline import Sightlines
@@ -58,6 +59,8 @@ class Judge:
         low, high = self.graph.cells[cell]
         if not ((origin > low) & (origin < high)).all():
             return Judgement.BLOCKED
+        if not inside_plans(self.graph.plans, np.array([cell]), origin[None])[0]:
+            return Judgement.BLOCKED
         if self.lines is not None and not self.lines.outside_solids(origin[None])[0]:
             return Judgement.BLOCKED
         found = (
@@ -74,6 +77,7 @@ class Judge:
         found = np.full(len(cells), Judgement.BLOCKED, np.int8)
         boxes = self.graph.cells[cells]
         rows = np.flatnonzero(((origins > boxes[:, 0]) & (origins < boxes[:, 1])).all(axis=1))
+        rows = rows[inside_plans(self.graph.plans, cells[rows], origins[rows])]
         if self.lines is not None and len(rows):
             rows = rows[self.lines.outside_solids(origins[rows])]
         if self.lines is None or len(self.cracks):

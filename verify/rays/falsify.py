@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...data.errors import InputError
+from ...data.plans import NO_PLANS, Plans
 from ..exact.sightline import Sightlines
 from .crossing import Crossings
 from .embree import Candidates, embree_scene
@@ -70,8 +71,8 @@ class Falsifier:
         opaque: tuple[np.ndarray, np.ndarray],
         glass: tuple[np.ndarray, np.ndarray],
         lines: Sightlines | None = None,
-        claimed_cells: np.ndarray | None = None,
-        cells: np.ndarray | None = None,
+        cells: tuple[np.ndarray, np.ndarray] | None = None,
+        plans: Plans = NO_PLANS,
         hints: Hints | None = None,
         shares: Mapping[str, float] | None = None,
         threads: int = THREADS,
@@ -87,8 +88,9 @@ class Falsifier:
                 object of each.
             glass: the same of transparent objects.
             lines: `Sightlines` of the opaque triangles, if they are there already.
-            claimed_cells: cells that each view cell may see, shape (rows, cells), bool; None if nothing is claimed.
-            cells: boxes of these cells [grid steps], shape (cells, 2, 3), int32.
+            cells: boxes of cells [grid steps], shape (cells, 2, 3), int32, and those that each view cell may see, shape
+                (rows, cells), bool; None if nothing is claimed of cells.
+            plans: of view cells that are prisms in their boxes.
             hints: sightlines to look near.
             shares: of the rays, by strategy (`guide.STRATEGIES`); they are scaled to a sum of 1.
             threads: that cast; they do not change the answer.
@@ -98,12 +100,11 @@ class Falsifier:
             InputError: shapes that do not match, or shares that are no shares.
         """
         rows, objects = len(boxes), claimed.shape[-1]
-        if cells is None or claimed_cells is None:
-            cells, claimed_cells = np.zeros((0, 2, 3), np.int32), np.zeros((rows, 0), bool)
+        boxes_of_cells, claimed_cells = cells or (np.zeros((0, 2, 3), np.int32), np.zeros((rows, 0), bool))
         for name, found, expected in (
             ("claimed", claimed.shape, (rows, objects)),
             ("spots", (len(spots),), (rows,)),
-            ("claimed_cells", claimed_cells.shape, (rows, len(cells))),
+            ("claimed_cells", claimed_cells.shape, (rows, len(boxes_of_cells))),
         ):
             if found != expected:
                 raise InputError(f"{name}: expected shape {expected}, found {found}")
@@ -111,9 +112,9 @@ class Falsifier:
         self._seed, self._threads = seed, threads
         self._owners = np.append(opaque[1], -1).astype(np.int64)
         self._scene = embree_scene(opaque[0])
-        self.free = FreeSpace(boxes, spots, lines or Sightlines(*opaque))
+        self.free = FreeSpace(boxes, spots, lines or Sightlines(*opaque), plans)
         triangles, owners = (np.concatenate(pair) for pair in zip(opaque, glass, strict=True))
-        self.targets = Targets(triangles, owners, objects, cells)
+        self.targets = Targets(triangles, owners, objects, boxes_of_cells)
         self._crossings = Crossings(self.targets.cells)
         self._guide = Guide(
             self.free, self.targets, np.concatenate([claimed, claimed_cells], axis=1), opaque, hints, seed

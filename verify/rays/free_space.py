@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.ndimage import label
 
+from ...data.plans import NO_PLANS, Plans
+from ..exact.plan import inside_plans
 from ..exact.sightline import Sightlines
 
 # Voxels along each axis of a view cell.
@@ -20,14 +22,16 @@ class FreeSpace:
     No surface of a closed object meets a connected set of unmixed voxels, so one exact test decides all its points.
     """
 
-    def __init__(self, boxes: np.ndarray, spots: list[np.ndarray], lines: Sightlines):
+    def __init__(self, boxes: np.ndarray, spots: list[np.ndarray], lines: Sightlines, plans: Plans = NO_PLANS):
         """Classify the voxels.
 
         Args:
             boxes: view cells [grid steps], shape (rows, 2, 3), integers.
             spots: free points strictly inside each, ragged, float32; possibly none.
             lines: the opaque triangles and their objects.
+            plans: of view cells that are prisms in their boxes.
         """
+        self._plans = plans
         self.low, self.high = boxes[:, 0].astype(np.float64), boxes[:, 1].astype(np.float64)
         self.lines = lines
         self._middles = ((self.low + self.high) / 2).astype(np.float32)
@@ -93,6 +97,7 @@ class FreeSpace:
             x, y, z = (place * RESOLUTION).astype(np.int64).T
             state = self.state[own, x, y, z]
             good &= state != SOLID
+            good &= inside_plans(self._plans, own, drawn.astype(np.float64))
             points[left[good]], fresh[left[good]], mixed[left[good]] = drawn[good], True, state[good] == MIXED
             left = left[~good]
             if not len(left):

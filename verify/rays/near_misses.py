@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...data.curtains import RISING
 from ...data.graph import OTHER_AXES
-from ...data.store.certificates import BLOCKERS, CORNERS, LEAVES, NODE_STEP, OCCLUDERS, PROOFS, TREES
+from ...data.store.certificates import BLOCKERS, CORNERS, FIRST_FENCE, LEAVES, NODE_STEP, OCCLUDERS, PROOFS, TREES
 from ...data.store.scene_folder import read_table
 from .guide import Hints
 
@@ -75,14 +76,21 @@ def certificate_hints(bake: "BakeFolder", sources: np.ndarray, count: int = 4096
 def _alone(bake: "BakeFolder") -> dict[int, int]:
     """Blocker by proof of the line trees that name a single one."""
     trees = read_table(bake.folder / "trees.parquet", TREES)
-    blockers = [{word // NODE_STEP for word in words if word >= 0} for words in trees["words"].to_pylist()]
+    # Nodes about the plan of an end name no blocker.
+    last = FIRST_FENCE * NODE_STEP
+    blockers = [{word // NODE_STEP for word in words if 0 <= word < last} for words in trees["words"].to_pylist()]
     proofs = trees["proof_id"].to_pylist()
     return {proof: min(named) for proof, named in zip(proofs, blockers, strict=True) if len(named) == 1}
 
 
 def _as_region(row: dict) -> dict:
-    """A row of blockers.parquet like one of occluders.parquet; blocker b has the id -1 - b."""
-    rectangles = [row[name] for name in BLOCKERS[3:]]
+    """A row of blockers.parquet like one of occluders.parquet, a curtain as a patch; blocker b has the id -1 - b."""
+    u0, v0, u1, v1 = rectangles = [row[name] for name in BLOCKERS[3:]]
+    if row["axis"] > 2:
+        low, high = row["coordinate"], row["top"]
+        a, b = ((u0, v0), (u1, v1)) if row["axis"] == RISING else ((u0, v1), (u1, v0))
+        corners = [*a, low, *b, low, *b, high, *a, high]
+        return {"occluder_id": -1 - row["blocker_id"], "kind": "patch", "corners": corners}
     return {"occluder_id": -1 - row["blocker_id"], "kind": "region", "rectangles": rectangles} | {
         name: row[name] for name in ("axis", "coordinate")
     }

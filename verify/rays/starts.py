@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ...data.graph import CellGraph
+from ..exact.plan import inside_plans
 from ..exact.sightline import Sightlines
 from ..exact.trace import Links
 
@@ -29,12 +30,14 @@ def cell_origins(graph: CellGraph, sources: np.ndarray, count: int, lines: Sight
     result = [np.zeros((0, 3), np.float32) for _ in sources]
     for trial, wanted in ((0, count), (1, 8 * count)):
         rows = [row for row, found in enumerate(result) if not len(found)]
-        if not rows or (trial and not lines.closed_owners.size):
+        if not rows or (trial and not lines.closed_owners.size and not len(graph.plans.rows)):
             break
         places = (rng.random((len(rows), 1, 3)) + np.arange(1, wanted + 1)[None, :, None] * steps) % 1.0
         points = (boxes[rows, None, 0] + places * (boxes[rows, None, 1] - boxes[rows, None, 0])).astype(np.float32)
         exact = points.astype(np.float64)
         good = ((exact > boxes[rows, None, 0]) & (exact < boxes[rows, None, 1])).all(axis=2)
+        cells = np.repeat(sources[rows], wanted).reshape(good.shape)
+        good[good] = inside_plans(graph.plans, cells[good], exact[good])
         good[good] = lines.outside_solids(exact[good])
         for row, own, keep in zip(rows, points, good, strict=True):
             result[row] = own[keep][:count]

@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 
 from ...data.graph import OTHER_AXES, CellGraph
 from ..arithmetic import as_integers, sign
+from ..exact.plan import inside_plans
 from ..exact.sightline import Sight, Sightlines, sure_sign
 
 # The object of a witness must be hit by the sightline prolonged by this factor.
@@ -180,7 +181,8 @@ def _starts_well(witnesses: Witnesses, graph: CellGraph, lines: Sightlines | Non
     _settle(reasons, ready, ~finite, MISSING)
     low, high = graph.cells[witnesses.cells, 0], graph.cells[witnesses.cells, 1]
     inside = (witnesses.origins > low) & (witnesses.origins < high)
-    _settle(reasons, ready, ~inside.all(axis=1), START)
+    inside = inside.all(axis=1) & inside_plans(graph.plans, witnesses.cells, witnesses.origins)
+    _settle(reasons, ready, ~inside, START)
     if lines is not None:
         rows = np.flatnonzero(ready)
         solid = np.zeros(len(ready), bool)

@@ -11,6 +11,7 @@ from ...data.graph import CellGraph
 from ...data.inhabit import find_inhabitable
 from ...data.portals import find_portals
 from ...data.prepared import PreparedModel
+from ...data.room_cells import add_room_cells
 from ...data.scene import GRID_LIMIT, GRID_M, Role
 from ...data.solids import dead_cells
 from ...data.store.graph_folder import read_graph
@@ -147,10 +148,19 @@ def build_graph(model: PreparedModel, settings: Settings, clock: Clock) -> tuple
     graph = find_portals(cells[~dead], opaque)
     inhabited = find_inhabitable(scene, graph)
     graph.inhabitable, graph.cell_names = inhabited.mask, inhabited.names
+    reason = inhabited.reason
+    if scene.spaces and not (inhabited.names != "").any():
+        # No cell along the axes lies in a room, but rooms have view cells of their own.
+        graph.inhabitable = np.zeros(graph.cell_count, bool)
+        reason = f"inside the model's {len(scene.spaces)} rooms"
+    graph, covers = add_room_cells(scene, graph)
+    if not graph.inhabitable.any():
+        graph.inhabitable, reason = inhabited.mask, inhabited.reason
     clock.lap("portals")
     notes = {
-        "inhabitable_because": inhabited.reason,
+        "inhabitable_because": reason,
         "leak_cells": inhabited.leak,
+        "rooms": [{"name": c.name, "covered": round(c.share, 4), **({"why": c.why} if c.why else {})} for c in covers],
         "dead_cells": int(dead.sum()),
         "axial_area_m2": round(opaque.axial_area * scene.grid_m**2, 3),
         "axial_area_lost_m2": round(opaque.lost_area * scene.grid_m**2, 3),

@@ -12,6 +12,7 @@ from ... import __version__
 from ...data.graph import CellGraph
 from ...data.rows import Rows
 from ...data.scene import Scene
+from ...data.store.scene_folder import FORMAT, PLAN_FORMAT
 from .settings import Settings
 
 
@@ -97,7 +98,7 @@ def bake_manifest(
             counts |= {name: len(rows), f"{name}_seen": int(rows.seen.sum())}
     clock.lap("write")
     return facts | {
-        "format": 1,
+        "format": PLAN_FORMAT if len(graph.plans.rows) else FORMAT,
         "kind": "bake",
         "viewcell": __version__,
         "model": {"path": facts["source"], "sha256": facts["sha256"]},

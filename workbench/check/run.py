@@ -246,7 +246,6 @@ class _Hunt:
         sources, claimed = self.result.sources, self.result.claimed
         start = time.perf_counter()
         objects = claimed.get("object", np.ones((len(self.result.cell_ids), len(self.result.object_names)), bool))
-        cells = {} if "cell" not in claimed else {"claimed_cells": claimed["cell"][sources]}
         falsifier = Falsifier(
             boxes=self.result.boxes[sources],
             spots=self.spots,
@@ -254,9 +253,8 @@ class _Hunt:
             opaque=self.opaque,
             glass=self.glass,
             lines=self.judge.lines,
-            cells=self.result.boxes if cells else None,
+            cells=(self.result.boxes, claimed["cell"][sources]) if "cell" in claimed else None,
             seed=self.seed,
-            **cells,
         )
         self.result.seconds["prepare"] = time.perf_counter() - start
         self.hunt(falsifier, progress)

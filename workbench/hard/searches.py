@@ -22,6 +22,7 @@ from ...solvers.visibility.graph_engine import GraphEngine
 from ...verify.cases.hard_cases import GraphCase, HardCases, RegionCase, faces
 from ...verify.proofs.line_tree import Blocker
 from ...verify.proofs.line_tree import hides as line_tree_hides
+from ...verify.proofs.ways import End
 from .outcomes import Outcome, Outcomes, one_sided, two_sided, worst
 
 # Halvings, and lines tried, before a kernel gives up a case.
@@ -93,7 +94,7 @@ def line_trees(cases: HardCases, device: Device) -> Outcomes:
     for asked in _axial_regions(cases, device):
         answers = launch_target_search(asked.tree, asked.ends, TO_SURFACE, cap=CAP, device=device)
         words = launch_line_trees(asked.tree, asked.ends, TO_SURFACE, answers.nodes, device=device).words.tolist()
-        if words and not line_tree_hides(*asked.ends.tolist(), True, words, asked.blockers):
+        if words and not line_tree_hides(*map(End, asked.ends.tolist()), True, words, asked.blockers):
             yield asked.case.name, Outcome.WRONG
         else:
             yield asked.case.name, one_sided(bool(words), asked.case.expected == "hidden")

@@ -105,7 +105,7 @@ def change_ids(folder, table, column, value):
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda folder: change_manifest(folder, format=2), "format"),
+        (lambda folder: change_manifest(folder, format=3), "format"),
         (lambda folder: change_manifest(folder, complete=False), "complete"),
         (lambda folder: change_manifest(folder, kind="scene"), "bake"),
         (lambda folder: change_manifest(folder, grid_m=None), "expected the key 'grid_m', found none"),

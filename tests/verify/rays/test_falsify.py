@@ -87,13 +87,13 @@ def test_every_planted_object_is_found_and_nothing_else(house):
 def test_every_planted_cell_is_found_and_nothing_else(house):
     for row, target in np.argwhere(house.cells):
         if target != house.sources[row]:
-            claim = {"claimed_cells": without(house.cells, row, target), "cells": house.boxes}
+            claim = {"cells": (house.boxes, without(house.cells, row, target))}
             found = confirmed(house, search(house, **claim), 10 * RAYS, stop=True)
             assert found == {(row, 0, target)}, (row, target)
 
 
 def test_a_true_claim_stands(house):
-    falsifier = search(house, claimed_cells=house.cells, cells=house.boxes)
+    falsifier = search(house, cells=(house.boxes, house.cells))
     assert confirmed(house, falsifier, 4 * RAYS) == set()
 
 
@@ -156,7 +156,7 @@ def test_rays_pass_outside_the_edges_of_a_blocker():
 def test_gaps_are_found_sooner_than_by_chance(house):
     """A doorway that shows itself to few sightlines of the store: rays past the edges of what has stopped others."""
     row, target = list(house.sources).index(5), 1
-    claim = {"claimed_cells": without(house.cells, row, target), "cells": house.boxes}
+    claim = {"cells": (house.boxes, without(house.cells, row, target))}
     proposed = {}
     for name, shares in (("aim", {"aim": 1.0}), ("gap", {"aim": 0.2, "gap": 0.8})):
         falsifier = search(house, shares=shares, seed=2, **claim)
@@ -270,7 +270,7 @@ def test_uniform_rays_are_uniform_and_outside_solids(house):
 def test_uniform_rays_see_hidden_cells_too(house):
     """Without any ray aimed at it, a hidden room is found by the uniform rays that pass through it."""
     claim = without(house.cells, list(house.sources).index(0), 2)
-    falsifier = search(house, claimed_cells=claim, cells=house.boxes, shares={"uniform": 1.0})
+    falsifier = search(house, cells=(house.boxes, claim), shares={"uniform": 1.0})
     assert confirmed(house, falsifier) == {(list(house.sources).index(0), 0, 2)}
 
 
@@ -310,7 +310,7 @@ def test_no_triangles(house):
     assert list(Falsifier(**shared, opaque=none, glass=none).batches(RAYS)) == []
     cells = np.ones_like(house.cells)
     cells[0, 5] = False
-    falsifier = Falsifier(**shared, opaque=none, glass=none, claimed_cells=cells, cells=house.boxes)
+    falsifier = Falsifier(**shared, opaque=none, glass=none, cells=(house.boxes, cells))
     found, _ = next(falsifier.batches(RAYS))
     assert set(found.targets) == {5} and set(found.kinds) == {0} and np.isinf(found.reach).all()
 
@@ -338,7 +338,7 @@ def test_a_cell_inside_a_solid_casts_nothing(house):
     ("options", "said"),
     [
         ({"claimed": np.zeros((2, 19), bool)}, "claimed: expected shape"),
-        ({"claimed_cells": np.zeros((4, 3), bool), "cells": np.zeros((2, 2, 3), np.int32)}, "claimed_cells: expected"),
+        ({"cells": (np.zeros((2, 2, 3), np.int32), np.zeros((4, 3), bool))}, "claimed_cells: expected"),
         ({"shares": {"guess": 1.0}}, "found 'guess'"),
         ({"shares": {"aim": 0.0}}, "not all 0"),
         ({"shares": {"aim": 1.0, "gap": -0.5}}, "0 or more"),

@@ -14,11 +14,12 @@ LEAST_DEG = 1e-4
 UPRIGHT = 0.01
 
 
-def wall_yaw(meshes: list[tuple[np.ndarray, np.ndarray]]) -> float:
+def wall_yaw(meshes: list[tuple[np.ndarray, np.ndarray]], window_deg: float = WINDOW_DEG) -> float:
     """How most of the upright faces of meshes stand about the vertical.
 
     Args:
         meshes: vertices [m], shape (n, 3), and faces, shape (m, 3), of each.
+        window_deg: directions are taken together within this angle.
 
     Returns:
         The angle to the axes at which the largest area stands, counter-clockwise, in degrees from -45 to 45; 0 if
@@ -42,7 +43,7 @@ def wall_yaw(meshes: list[tuple[np.ndarray, np.ndarray]]) -> float:
     )
     total = np.concatenate([[0.0], np.cumsum(area)])
     first = np.arange(len(order))
-    last = np.searchsorted(angle, angle[first] + WINDOW_DEG, side="right")
+    last = np.searchsorted(angle, angle[first] + window_deg, side="right")
     best = int((total[last] - total[first]).argmax())
     inside = slice(best, last[best])
     yaw = float(np.average(angle[inside], weights=area[inside])) % 90.0

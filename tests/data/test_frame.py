@@ -5,9 +5,9 @@ import pytest
 import trimesh
 from builders import random_solids
 from viewcell.data.errors import InputError
+from viewcell.data.frame import wall_yaw
 from viewcell.data.prepared import PreparedModel
 from viewcell.data.readers import read
-from viewcell.data.readers.frame import wall_yaw
 from viewcell.data.scene import turned
 from viewcell.data.store.bake_folder import read_bake
 from viewcell.data.store.scene_folder import read_scene, write_scene

@@ -1,0 +1,341 @@
+"""Curtains: upright opaque rectangles at any angle, inside closed elements or on their faces.
+
+A curtain stands on the segment between two grid points of the plan and blocks between two heights. Inside a closed
+element any rectangle that no triangle of the element comes near is opaque to eyes outside solids, however it was found:
+elements are cut in floating point, along the directions of their own faces, and every rectangle is then checked. A face
+whose corners stand over two grid points is a curtain as it is.
+
+The line search cannot use a curtain whole where the line passes close above or below it; so inside elements each comes
+with its halves, their halves, and so on. Source of the idea of occluders at any angle: Chhugani et al. 2005, section
+5.2; the ways past them are in kernels/curtains.py.
+"""
+
+from fractions import Fraction
+from itertools import combinations
+
+import numpy as np
+
+from .blockers import Blockers, maximal_rectangles, paint
+from .hierarchy import build_hierarchy
+from .opaque import plane_rectangles
+from .regions import section_rectangles
+from .scene import turned
+from .solids import winding_numbers
+
+# `Blockers.axis` of a curtain from the corner of its plan box with the least x and y to the opposite one, and of one
+# from least x and greatest y; with COMPOSITE - RISING added where smaller pieces, or what lies behind, say the same.
+RISING, FALLING, COMPOSITE = 3, 4, 5
+# Rectangles below this hide little.
+LEAST_M2 = 0.25
+# Halving a curtain ends here.
+PIECE_M = 0.25
+# Pairs of a rectangle and a triangle that are looked at together.
+PAIRS = 100_000
+# Elements are cut so far inside their faces [grid steps], and through the middle where they are thinner than THIN_M.
+RECESS, ENDS = 4, 2
+THIN_M = 0.6
+# Normals that rise by less than this are upright; those within NEAR_DEG stand alike.
+UPRIGHT = 1e-3
+NEAR_DEG = 0.2
+# Round elements have a face for every direction: only so many are looked at.
+MOST_DIRECTIONS = 8
+# Corners of an element are joined to sections that end so near [grid steps].
+TIP_STEPS = 400
+# No triangle comes so near to a curtain inside an element [grid steps]: its pieces end on the grid beside it.
+CLEAR_STEPS = 1.0
+
+
+def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float) -> Blockers:
+    """Curtains of a model.
+
+    Args:
+        elements: triangles of each closed opaque element [grid steps], shape (m, 3, 3), int32.
+        faces: triangles of opaque objects, shape (n, 3, 3), int32.
+        grid_m: grid step [m].
+    """
+    least = LEAST_M2 / grid_m**2
+    boxes, kinds = [np.zeros((0, 2, 3), np.int64)], [np.zeros(0, np.int64)]
+    for triangles in elements:
+        quads = _sections(triangles, least, THIN_M / grid_m)
+        if not len(quads):
+            continue
+        quads = quads[_inside(quads, triangles)]
+        for part, composite in _pieces(quads, PIECE_M / grid_m):
+            _add(boxes, kinds, part, composite)
+        for part, composite in zip(_tips(quads, triangles), (False, True), strict=True):
+            _add(boxes, kinds, part, composite)
+    _add(boxes, kinds, _upright_faces(faces, least), True)
+    joined = np.concatenate(boxes).astype(np.int32)
+    return Blockers(joined, np.concatenate(kinds).astype(np.int32), build_hierarchy(joined))
+
+
+def _add(boxes: list[np.ndarray], kinds: list[np.ndarray], quads: np.ndarray, composite: bool) -> None:
+    """Enter curtains (A, B) x (x, y, z), the z of A below that of B; one along an axis is a plain rectangle."""
+    way = quads[:, 1] - quads[:, 0]
+    kind = np.where(way[:, 0] * way[:, 1] > 0, RISING, FALLING) + composite * (COMPOSITE - RISING)
+    kind[way[:, 1] == 0] = 1
+    kind[way[:, 0] == 0] = 0
+    boxes.append(np.sort(quads, axis=1))
+    kinds.append(kind)
+
+
+def _directions(triangles: np.ndarray, least: float) -> list[tuple[float, np.ndarray]]:
+    """Yaws of the larger upright faces that stand off the axes [degrees], and the depths of those faces along it."""
+    edges = (triangles[:, 1:] - triangles[:, :1]).astype(float)
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    size = np.linalg.norm(normals, axis=1)
+    rows = np.flatnonzero((np.abs(normals[:, 2]) <= UPRIGHT * size) & (normals[:, :2] != 0).all(axis=1))
+    if not len(rows):
+        return []
+    yaw = np.degrees(np.arctan2(normals[rows, 1], normals[rows, 0])) % 180.0
+    area = size[rows] / 2
+    found: list[tuple[float, np.ndarray]] = []
+    left = np.ones(len(rows), bool)
+    while left.any() and len(found) < MOST_DIRECTIONS:
+        pick = np.flatnonzero(left)[area[left].argmax()]
+        off = np.abs((yaw - yaw[pick] + 90.0) % 180.0 - 90.0)
+        near = left & (off < NEAR_DEG)
+        left &= ~near
+        if area[near].sum() < least:
+            continue
+        n = np.radians(yaw[pick])
+        depth = triangles[rows[near]].mean(axis=1)[:, :2] @ np.array([np.cos(n), np.sin(n)])
+        found.append((float(yaw[pick]), np.sort(depth)))
+    return found
+
+
+def _sections(triangles: np.ndarray, least: float, thin: float) -> np.ndarray:
+    """Rectangles in sections of one element along its oblique faces: (A, B) x (x, y, z), shape (n, 2, 3), int64."""
+    quads = [np.zeros((0, 2, 3), np.int64)]
+    for yaw, depths in _directions(triangles, least):
+        level = np.round(turned(triangles.astype(float), -yaw)).astype(np.int64)
+        low, high = level[:, :, 0].min(axis=1), level[:, :, 0].max(axis=1)
+        for depth in _cuts(depths, int(low.min()), int(high.max()), thin):
+            cut = level[(low < depth) & (high >= depth)]
+            if not len(cut):
+                continue
+            rectangles = section_rectangles(cut, 0, depth, below=True)
+            if not len(rectangles):
+                continue
+            us, vs = np.unique(rectangles[:, :, 0]), np.unique(rectangles[:, :, 1])
+            solid = paint(rectangles, us, vs)
+            largest = maximal_rectangles(solid, solid, us, vs).astype(np.int64)
+            # Where the element's own coordinates are rounded into this frame a section may touch its border.
+            largest[:, :, 0] += np.array([ENDS, -ENDS])
+            size = largest[:, 1] - largest[:, 0]
+            largest = largest[(size[:, 0] > 0) & (size[:, 0] * size[:, 1] >= least)]
+            corners = np.concatenate([np.full((len(largest), 2, 1), depth), largest], axis=2)
+            quads.append(np.round(turned(corners.astype(float), yaw)).astype(np.int64))
+    found = np.concatenate(quads)
+    # A has the least x, and of two the least y.
+    swap = (found[:, 0, 0] > found[:, 1, 0]) | ((found[:, 0, 0] == found[:, 1, 0]) & (found[:, 0, 1] > found[:, 1, 1]))
+    found[swap, :, :2] = found[swap, ::-1, :2]
+    return np.unique(found, axis=0)
+
+
+def _cuts(depths: np.ndarray, low: int, high: int, thin: float) -> list[int]:
+    """Where to cut an element whose faces lie at some depths: just inside of each, and midway where it is thin."""
+    planes = np.unique(np.concatenate([[low], np.round(depths).astype(int), [high]]))
+    planes = planes[np.append(True, np.diff(planes) > 2)]
+    cuts = set()
+    for a, b in zip(planes[:-1].tolist(), planes[1:].tolist(), strict=True):
+        if b - a < thin:
+            cuts.add((a + b) // 2)
+        if b - a > 4 * RECESS:
+            cuts |= {a + RECESS, b - RECESS}
+    return sorted(cuts)
+
+
+def _pieces(quads: np.ndarray, least: float) -> list[tuple[np.ndarray, bool]]:
+    """Curtains with their halves and the halves of those, down to a length; and whether each lot has smaller pieces."""
+    found = []
+    length = np.hypot(*(quads[:, 1, :2] - quads[:, 0, :2]).T)
+    times = np.maximum(0, np.floor(np.log2(np.maximum(length, 1.0) / least))).astype(int)
+    for most in np.unique(times):
+        mine = quads[times == most]
+        for level in range(most + 1):
+            parts = 2**level
+            share = np.arange(parts + 1)[:, None] / parts
+            a, b = mine[:, None, 0, :2], mine[:, None, 1, :2]
+            points = np.round(a + share[None] * (b - a)).astype(np.int64)
+            piece = np.empty((len(mine), parts, 2, 3), np.int64)
+            piece[:, :, 0, :2], piece[:, :, 1, :2] = points[:, :-1], points[:, 1:]
+            piece[:, :, :, 2] = mine[:, None, :, 2]
+            found.append((piece.reshape(-1, 2, 3), level < most))
+    return found
+
+
+def _inside(quads: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Rectangles inside a closed surface none of whose triangles comes within CLEAR_STEPS, shape (n,), bool."""
+    held = np.abs(winding_numbers(quads.mean(axis=1), triangles)) > 0.5
+    rows = np.flatnonzero(held)
+    held[rows[meeting(quads[rows], triangles, CLEAR_STEPS)[0]]] = False
+    return held
+
+
+def _tips(quads: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rectangles from the ends of sections to upright edges of their element nearby: (A, B) x (x, y, z), (n, 2, 3).
+
+    A section ends some steps short of the end of a wall. What it leaves open to the corner, where the next wall begins,
+    they close: those from the near end. Those from the far end hide what stands behind the corner from eyes that look
+    along the wall.
+    """
+    t = triangles.astype(np.int64)
+    edges = np.concatenate([t[:, [k, (k + 1) % 3]] for k in range(3)])
+    upright = (edges[:, 0, :2] == edges[:, 1, :2]).all(axis=1)
+    edges = np.unique(np.sort(edges[upright], axis=1), axis=0)
+    found: tuple[set, set] = set(), set()
+    for quad in quads:
+        for end in (0, 1):
+            along = quad[end, :2] - quad[1 - end, :2]
+            for low, high in edges:
+                way = low[:2] - quad[end, :2]
+                if not 0 < np.abs(way).max() <= TIP_STEPS or way @ along < 0:
+                    continue
+                z = max(int(low[2]), int(quad[0, 2])), min(int(high[2]), int(quad[1, 2]))
+                for far in (0, 1) if z[0] < z[1] else ():
+                    other = quad[1 - end if far else end, :2]
+                    a, b = sorted([tuple(low[:2].tolist()), tuple(other.tolist())])
+                    found[far].add(((*a, z[0]), (*b, z[1])))
+    return tuple(_opaque(np.array(sorted(part), np.int64).reshape(-1, 2, 3), triangles) for part in found)
+
+
+def _opaque(quads: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Those of some rectangles that lie inside a closed surface, borders aside; exactly."""
+    quads = quads[np.abs(winding_numbers(quads.mean(axis=1), triangles)) > 0.5]
+    clear = np.ones(len(quads), bool)
+    for row, near in zip(*meeting(quads, triangles, CLEAR_STEPS), strict=True):
+        clear[row] = clear[row] and not crossed(quads[row], triangles[near])
+    return quads[clear]
+
+
+def crossed(quad: np.ndarray, triangle: np.ndarray) -> bool:
+    """Whether a triangle meets the inside of an upright rectangle, exactly; what touches its border does not.
+
+    Args:
+        quad: (A, B) x (x, y, z), shape (2, 3), int64.
+        triangle: shape (3, 3), int.
+    """
+    (ax, ay, low), (bx, by, high) = quad.tolist()
+    x, y = bx - ax, by - ay
+    # Along the rectangle, out of its plane, and up; in whole numbers.
+    points = [((p - ax) * x + (q - ay) * y, (q - ay) * x - (p - ax) * y, r) for p, q, r in triangle.tolist()]
+    return _cuts_through(points, x * x + y * y, low, high)
+
+
+def _cuts_through(points: list[tuple[int, int, int]], length: int, low: int, high: int) -> bool:
+    """Whether a triangle (u, d, z) meets the inside of the rectangle 0 < u < length, d = 0, low < z < high."""
+    flat: list[tuple[Fraction, Fraction]] = []
+    for k in range(3):
+        (u, d, z), (v, e, y) = points[k], points[(k + 1) % 3]
+        if d == 0:
+            flat.append((Fraction(u), Fraction(z)))
+        if d * e < 0:
+            share = Fraction(d, d - e)
+            flat.append((u + share * (v - u), z + share * (y - z)))
+    if not flat:
+        return False
+    axes = [(1, 0), (0, 1)]
+    axes += [(q[1] - p[1], p[0] - q[0]) for p, q in combinations(flat, 2)]
+    corners = [(u, z) for u in (0, length) for z in (low, high)]
+    for x, y in axes:
+        if (x, y) != (0, 0):
+            mine, box = ([u * x + z * y for u, z in part] for part in (flat, corners))
+            if min(mine) >= max(box) or max(mine) <= min(box):
+                return False
+    return True
+
+
+def meeting(quads: np.ndarray, triangles: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of an upright rectangle and a triangle that may come within a margin of its inside.
+
+    Separating axes in the frame of the rectangle, in float64; what lies near is on the side of "may".
+
+    Args:
+        quads: (A, B) x (x, y, z) [grid steps], shape (n, 2, 3).
+        triangles: shape (m, 3, 3).
+        margin: [grid steps], out of the plane of the rectangle and along it; up and down it is 0.
+
+    Returns:
+        Rows of both, shape (pairs,).
+    """
+    found = [np.zeros((2, 0), int)]
+    step = max(1, PAIRS // max(1, len(triangles)))
+    for begin in range(0, len(quads), step):
+        rows, near = _meeting(quads[begin : begin + step].astype(float), triangles.astype(float), margin)
+        found.append(np.stack([rows + begin, near]))
+    return tuple(np.concatenate(found, axis=1))
+
+
+def _meeting(quads: np.ndarray, triangles: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """As `meeting`, of few enough."""
+    along = quads[:, 1, :2] - quads[:, 0, :2]
+    length = np.hypot(along[:, 0], along[:, 1])
+    along = along / length[:, None]
+    x, y = (triangles[None, :, :, axis] - quads[:, 0, axis, None, None] for axis in (0, 1))
+    ux, uy = along[:, 0, None, None], along[:, 1, None, None]
+    # Along the rectangle, and out of its plane.
+    u, d = x * ux + y * uy, y * ux - x * uy
+    low, high = triangles[:, :, 2].min(axis=1), triangles[:, :, 2].max(axis=1)
+    near = (d.min(axis=2) <= margin) & (d.max(axis=2) >= -margin)
+    near &= (u.min(axis=2) <= length[:, None] + margin) & (u.max(axis=2) >= -margin)
+    # Top and bottom are exact: what only touches them does not part the rectangle.
+    near &= (low < quads[:, 1, None, 2]) & (high > quads[:, 0, None, 2])
+    rows, which = np.nonzero(near)
+    u, d, z = u[rows, which], d[rows, which], triangles[which, :, 2]
+    # The part of each triangle within the margin of the plane, as the points that bound it.
+    us, zs, used = [], [], []
+    for k in range(3):
+        j = (k + 1) % 3
+        us.append(u[:, k])
+        zs.append(z[:, k])
+        used.append(np.abs(d[:, k]) <= margin)
+        rise = d[:, j] - d[:, k]
+        for level in (-margin, margin):
+            share = np.divide(level - d[:, k], rise, out=np.full(len(rows), -1.0), where=rise != 0)
+            us.append(u[:, k] + share * (u[:, j] - u[:, k]))
+            zs.append(z[:, k] + share * (z[:, j] - z[:, k]))
+            used.append((share >= 0) & (share <= 1))
+    us, zs, used = np.stack(us), np.stack(zs), np.stack(used)
+    # A polygon and a rectangle of a plane are apart if a line along a side of either parts them.
+    right, bottom, top = length[rows] + margin, quads[rows, 0, 2], quads[rows, 1, 2]
+    corners = [(side, level) for side in (np.full(len(rows), -margin), right) for level in (bottom, top)]
+    one, none = np.ones(len(rows)), np.zeros(len(rows))
+    axes = [(one, none), (none, one)]
+    axes += [(z[:, k] - z[:, (k + 1) % 3], u[:, (k + 1) % 3] - u[:, k]) for k in range(3)]
+    parted = ~used.any(axis=0)
+    for a, b in axes:
+        value, box = us * a + zs * b, np.stack([cu * a + cz * b for cu, cz in corners])
+        least, most = np.where(used, value, np.inf).min(axis=0), np.where(used, value, -np.inf).max(axis=0)
+        parted |= ((least >= box.max(axis=0)) | (most <= box.min(axis=0))) & ((a != 0) | (b != 0))
+    return rows[~parted], which[~parted]
+
+
+def _upright_faces(triangles: np.ndarray, least: float) -> np.ndarray:
+    """Rectangles that triangles over two plan points make up: (A, B) x (x, y, z), shape (n, 2, 3), int64."""
+    t = triangles.astype(np.int64)
+    # Plan points as single numbers, in the order of x, then y.
+    key = t[:, :, 0] * (1 << 32) + t[:, :, 1]
+    order = np.sort(key, axis=1)
+    two = (order[:, 0] != order[:, 2]) & ((order[:, 1] == order[:, 0]) | (order[:, 1] == order[:, 2]))
+    extent = np.ptp(t, axis=1)
+    two &= (extent[:, :2] > 0).all(axis=1) & (np.hypot(extent[:, 0], extent[:, 1]) * extent[:, 2] >= least / 4)
+    t, key, order = t[two], key[two], order[two]
+    ends = order[:, [0, 2]]
+    _, group = np.unique(ends, axis=0, return_inverse=True)
+    group = group.ravel()
+    rows = np.argsort(group, kind="stable")
+    found = [np.zeros((0, 2, 3), np.int64)]
+    for part in np.split(rows, np.flatnonzero(np.diff(group[rows])) + 1) if len(rows) else []:
+        # Over the first point 0, over the second one 1.
+        side = (key[part] != ends[part[0], 0]).astype(np.int64)
+        first, second = (t[part][key[part] == end][0, :2] for end in ends[part[0]])
+        flat, _, _ = plane_rectangles(np.stack([side, t[part, :, 2]], axis=2).astype(np.int32), 1)
+        flat = flat[(flat[:, 0, 0] == 0) & (flat[:, 1, 0] == 1)].astype(np.int64)
+        size = (flat[:, 1, 1] - flat[:, 0, 1]) * np.hypot(*(second - first))
+        flat = flat[size >= least]
+        quad = np.empty((len(flat), 2, 3), np.int64)
+        quad[:, 0, :2], quad[:, 1, :2] = first, second
+        quad[:, :, 2] = flat[:, :, 1]
+        found.append(quad)
+    return np.concatenate(found)
