@@ -22,9 +22,11 @@ from .prisms import slanted
 from .shapes import pierced_block
 from .works import Works
 
-# Of the foyer along its shorter side; and how far its parts reach into the wings' end walls, so that what is rounded in
-# different frames leaves no slit.
-GAP_M, EMBED_M = 1.5, 4 / 32
+# Length of a foyer along its shorter side.
+GAP_M = 1.5
+# So much of their thickness the walls of a foyer reach into those of the wings: what is rounded in different frames
+# leaves no slit then.
+EMBED = 0.4
 MOST_WINGS, STEEPEST_DEG = 12, 120.0
 LETTERS = "ABCDEFGHIJKL"
 WINDOW_M, WINDOW_MARGIN_M = 2.0, 1.0
@@ -144,16 +146,16 @@ def build_foyer(works: Works, joint: Joint, name: str, levels: list[tuple[float,
         joint: where.
         name: of the foyer.
         levels: floor and ceiling of each storey [m]; between two storeys lies a slab.
-        wall: thickness of the walls [m].
+        wall: thickness of the walls, and of slab and roof if there is one storey [m].
     """
     slab = levels[1][0] - levels[0][1] if len(levels) > 1 else wall
     whole, outer = (0.0, joint.depth), (joint.depth - wall, joint.depth)
     # At the far corners nothing may reach beyond the wings' faces.
-    embed = (EMBED_M, 0.0)
+    embed = (EMBED * wall, 0.0)
     for number, (floor, ceiling) in enumerate(levels, start=1):
         here = f"{name} {number}"
         works.put("IfcSlab", f"slab {here}", joint.strip(whole, (floor - slab, floor), embed), joint.frame)
-        inner = joint.strip((0.0, wall), (floor, ceiling), (EMBED_M, EMBED_M))
+        inner = joint.strip((0.0, wall), (floor, ceiling), (embed[0], embed[0]))
         works.put("IfcWall", f"inner wall of {here}", inner, joint.frame)
         holes = _windows(joint, outer, floor)
         works.put("IfcWall", f"outer wall of {here}", joint.strip(outer, (floor, ceiling), embed, holes), joint.frame)
