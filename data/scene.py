@@ -7,6 +7,7 @@ coordinate, relative to `origin`. Source of the definition/instance/LOD scheme: 
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,8 @@ class Role(StrEnum):
     TRANSPARENT = "transparent"
 
 
+# Which end of a box on each axis: its eight corners.
+CORNERS = np.array(list(product((0, 1), repeat=3)))
 # What stops sightlines.
 OPAQUE = (Role.OCCLUDER, Role.DETAIL)
 
@@ -234,6 +237,12 @@ def turned(points: np.ndarray, yaw_deg: float) -> np.ndarray:
     """Points, shape (..., 3), turned counter-clockwise about the z axis."""
     cos, sin = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
     return points @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+
+
+def boxes_around(boxes: np.ndarray, transform: np.ndarray) -> np.ndarray:
+    """Axial boxes around boxes [m] that a transform of shape (4, 4) moves, both of shape (n, 2, 3)."""
+    corners = boxes[:, CORNERS, np.arange(3)] @ transform[:3, :3].T + transform[:3, 3]
+    return np.stack([corners.min(axis=1), corners.max(axis=1)], axis=1)
 
 
 def snap(metres: np.ndarray, grid_m: float, where: str) -> np.ndarray:

@@ -22,6 +22,10 @@ from math import ceil, floor
 
 import numpy as np
 
+from ..data.buildings.furnish import turned
+from ..data.buildings.wings import LETTERS, Joint, build_foyer, join_wings
+from ..data.buildings.works import Works
+from ..data.errors import InputError
 from ..data.graph import CellGraph
 from ..data.opaque import OpaquePlanes
 from ..data.portals import find_portals
@@ -50,6 +54,10 @@ Box = tuple[Point, Point]
 NEAR = st.integers(-2, 2)
 # Grid steps in a module of a building, and thickness of its walls.
 MODULE, WALL = 1024, 128
+# Between two wings where they are nearest.
+FOYER = 512
+# Angles between two wings.
+WING_ANGLES_DEG = (30.0, -17.0, 45.0, 60.0, -75.0)
 CORNERS = np.array(list(product((0, 1), repeat=3)))
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 FACES = np.array([face for a, b, c, d in QUADS for face in ((a, b, c), (a, c, d))], np.int32)
@@ -121,17 +129,24 @@ class Door:
 
 @dataclass(frozen=True)
 class Building:
-    """Rooms on a grid, walls with openings, and furniture.
+    """Rooms on a grid, walls with openings, and furniture; as it stands, turned, or several of it joined end to end.
 
     Attributes:
         rooms: columns, rows and storeys.
-        doors: openings; two in one wall may touch or overlap.
+        doors: openings; two in one wall may touch or overlap. With several wings, those of the last column to the next
+            are passages from wing to wing.
         furniture: boxes.
+        yaw_deg: by which all of it is turned counter-clockwise about the origin.
+        wings: copies of the building, each joined to the last column of the one before by a foyer.
+        wing_angle_deg: by which each is turned relative to the one before, -90 to 90.
     """
 
     rooms: Point
     doors: tuple[Door, ...] = ()
     furniture: tuple[Box, ...] = ()
+    yaw_deg: float = 0.0
+    wings: int = 1
+    wing_angle_deg: float = 0.0
 
     def room(self, place: Point) -> np.ndarray:
         """Box of a room, shape (2, 3)."""
@@ -140,8 +155,12 @@ class Building:
 
     @cached_property
     def solids(self) -> list[Box]:
-        """Boxes of walls and slabs, those around the building included; they touch but do not overlap."""
-        out = [box for panel in self._panels() for box in panel[0]]
+        """Boxes of walls and slabs of the first wing, those around it included; they touch but do not overlap."""
+        return self._solids(False, self.wings > 1)
+
+    def _solids(self, west: bool, east: bool) -> list[Box]:
+        """Boxes of a wing whose west and east ends may have passages."""
+        out = [box for panel in self._panels(west, east) for box in panel[0]]
         # Walls meet in posts and beams, from node to node of the grid.
         for place in product(*(range(n + 1) for n in self.rooms)):
             node = np.array(place) * MODULE - WALL // 2
@@ -152,15 +171,18 @@ class Building:
                     out.append(_box(node + along * WALL, node + np.where(along, MODULE, WALL)))
         return out
 
-    def _panels(self) -> list[tuple[list[Box], list[Box]]]:
+    def _panels(self, west: bool = False, east: bool = False) -> list[tuple[list[Box], list[Box]]]:
         """Walls between rooms and around them, without posts and beams: solid pieces, and open ones, of each."""
         found = []
         for axis in range(3):
             for place in product(*(range(n + (i == axis)) for i, n in enumerate(self.rooms))):
                 below = tuple(c - (i == axis) for i, c in enumerate(place))
-                inside = 0 < place[axis] < self.rooms[axis]
+                open_ = 0 < place[axis] < self.rooms[axis]
+                if axis == 0 and place[0] in (0, self.rooms[0]):
+                    # A passage stands in both ends that it joins.
+                    below, open_ = (self.rooms[0] - 1, *place[1:]), east if place[0] else west
                 found.append(
-                    self._panel(axis, place, [d for d in self.doors if inside and (d.axis, d.room) == (axis, below)])
+                    self._panel(axis, place, [d for d in self.doors if open_ and (d.axis, d.room) == (axis, below)])
                 )
         return found
 
@@ -180,10 +202,31 @@ class Building:
         return solid, open_
 
     @cached_property
+    def frames(self) -> tuple[list[np.ndarray], list[Joint]]:
+        """Each wing's frame to the scene's [m], shape (4, 4), and the joints between them."""
+        size = (np.array(self.rooms[:2]) * MODULE + WALL) * GRID_M
+        corner = turned(np.array([-WALL / 2 * GRID_M, -WALL / 2 * GRID_M, 0.0]), 0.0)
+        first = turned(np.zeros(3), np.radians(self.yaw_deg)) @ corner
+        frames, joints = join_wings(tuple(size), self.wings, self.wing_angle_deg, first, gap=FOYER * GRID_M)
+        return [frame @ np.linalg.inv(corner) for frame in frames], joints
+
+    @cached_property
     def scene(self) -> Scene:
-        """Walls as occluders, furniture as detail, rooms as spaces."""
+        """Walls as occluders, furniture as detail, rooms as spaces; with wings, names begin with A, B and so on."""
+        frames, joints = self.frames
+        works = Works()
+        for number, frame in enumerate(frames):
+            wing = self._wing(number > 0, number < self.wings - 1)
+            works.take(wing, frame, f"{LETTERS[number]} " if self.wings > 1 else "")
+        levels = [(WALL / 2 * GRID_M, (self.rooms[2] * MODULE - WALL / 2) * GRID_M)]
+        for number, joint in enumerate(joints):
+            build_foyer(works, joint, f"foyer {number}", levels, WALL / 2 * GRID_M)
+        return works.scene(repr(self))
+
+    def _wing(self, west: bool, east: bool) -> Scene:
+        """One wing on the axes."""
         shape = Definition("box", (Mesh(CORNERS.astype(float), FACES),))
-        parts = [(box, f"wall {n}", Role.OCCLUDER) for n, box in enumerate(self.solids)]
+        parts = [(box, f"wall {n}", Role.OCCLUDER) for n, box in enumerate(self._solids(west, east))]
         parts += [(box, f"furniture {n}", Role.DETAIL) for n, box in enumerate(self.furniture)]
         objects = []
         for (low, high), name, role in parts:
@@ -195,19 +238,32 @@ class Building:
         for place in product(*map(range, self.rooms)):
             low, high = self.room(place)
             spaces.append(Space(f"room {place}", (low + CORNERS * (high - low)) * GRID_M, FACES))
-        return Scene([shape], objects, spaces, source=repr(self))
+        return Scene([shape], objects, spaces)
 
     @cached_property
     def view_cells(self) -> dict[str, list]:
-        """One view cell per room [m], as a table that `viewcell.check` takes."""
-        boxes = [self.room(place) * GRID_M for place in product(*map(range, self.rooms))]
-        columns = {"cell_id": list(range(len(boxes)))}
+        """One view cell per room [m], wing by wing, as a table that `viewcell.check` takes.
+
+        In rooms that are turned they are the largest boxes that fit, less two grid steps.
+        """
+        boxes = []
+        for frame in self.frames[0]:
+            fit = np.abs(frame[:2, :2]).sum(axis=1).max()
+            for place in product(*map(range, self.rooms)):
+                low, high = self.room(place) * GRID_M
+                half, inset = (high - low) / 2, 0.0
+                if fit > 1.0:
+                    half, inset = half / [fit, fit, 1.0], [2 * GRID_M, 2 * GRID_M, 0.0]
+                middle = frame[:3, :3] @ (low + high) / 2 + frame[:3, 3]
+                boxes.append([middle - half + inset, middle + half - inset])
+        found = np.array(boxes)
+        columns: dict[str, list] = {"cell_id": list(range(len(found)))}
         for side, end in enumerate(("min", "max")):
-            columns |= {f"{end}_{axis}": [float(box[side, i]) for box in boxes] for i, axis in enumerate("xyz")}
+            columns |= {f"{end}_{axis}": found[:, side, i].tolist() for i, axis in enumerate("xyz")}
         return columns
 
     def graph(self) -> CellGraph:
-        """Rooms and doorways as a bare cell graph, all cells inhabitable."""
+        """Rooms and doorways of one wing as a bare cell graph, all cells inhabitable."""
         cells = [self.room(place) for place in product(*map(range, self.rooms))]
         cells += [np.array(box) for panel in self._panels() for box in panel[1]]
         graph = find_portals(np.array(cells, np.int32), OpaquePlanes([np.zeros((0, 2, 3), np.int32)] * 3, 0.0, 0.0))
@@ -312,7 +368,15 @@ def knapsacks(draw: st.DrawFn, groups: int = 6, levels: int = 4) -> Knapsack:
 
 
 @st.composite
-def buildings(draw: st.DrawFn, columns: int = 3, rows: int = 2, storeys: int = 1, furniture: int = 2) -> Building:
+def buildings(
+    draw: st.DrawFn,
+    columns: int = 3,
+    rows: int = 2,
+    storeys: int = 1,
+    furniture: int = 2,
+    yaw: tuple[float, ...] = (0.0,),
+    wings: int = 1,
+) -> Building:
     """Rooms with doors that line up, or miss each other by a step or two, and furniture near the edges of doors.
 
     Args:
@@ -321,14 +385,18 @@ def buildings(draw: st.DrawFn, columns: int = 3, rows: int = 2, storeys: int = 1
         rows: at most.
         storeys: at most.
         furniture: pieces at most.
+        yaw: angles to choose from, by which a building is turned [degrees].
+        wings: at most; with several, a building may stand in any of a few angles to the next.
     """
     rooms = (draw(st.integers(1, columns)), draw(st.integers(1, rows)), draw(st.integers(1, storeys)))
+    count = draw(st.integers(1, wings))
     inner, doors = MODULE - WALL, []
     # All doors of a building are about two places, from which they differ by a step or two.
     places = [draw(st.integers(0, inner // 2)) for _ in range(2)]
     for place in product(*map(range, rooms)):
         for axis in range(3):
-            if place[axis] + 1 < rooms[axis] and draw(st.integers(0, 3)):
+            passage = axis == 0 and count > 1
+            if (passage or place[axis] + 1 < rooms[axis]) and draw(st.integers(0, 3)):
                 low, high = [], []
                 for _ in range(2):
                     first = min(max(0, draw(st.sampled_from(places)) + draw(NEAR)), inner - 1)
@@ -345,4 +413,17 @@ def buildings(draw: st.DrawFn, columns: int = 3, rows: int = 2, storeys: int = 1
             box[0].append(int(corner[axis]) + first)
             box[1].append(int(corner[axis]) + min(inner, first + draw(st.sampled_from((1, 40, 300, 800)))))
         boxes.append((tuple(box[0]), tuple(box[1])))
-    return Building(rooms, tuple(doors), tuple(boxes))
+    angle = draw(st.sampled_from(_clear_angles(rooms, count))) if count > 1 else 0.0
+    return Building(rooms, tuple(doors), tuple(boxes), draw(st.sampled_from(yaw)), count, angle)
+
+
+def _clear_angles(rooms: Point, wings: int) -> list[float]:
+    """Angles between wings at which none stands in the way of another."""
+    found = []
+    for angle in WING_ANGLES_DEG:
+        try:
+            _ = Building(rooms, wings=wings, wing_angle_deg=angle).frames
+        except InputError:
+            continue
+        found.append(angle)
+    return found

@@ -130,15 +130,34 @@ def _add_make(commands: argparse._SubParsersAction) -> None:
     office.add_argument("--floors", type=_whole(1), help="storeys, 1 to 100; 3 by default")
     office.add_argument("--rooms-per-side", type=_whole(1), help="offices on each side of the corridor; 8 by default")
     office.add_argument("--like", choices=["soda-hall"], help="a published model's size and statistics instead")
+    office.add_argument("--yaw", type=_number, default=0.0, metavar="DEG", help="turn it by so much; 0 by default")
+    office.add_argument("--wings", type=_whole(1), default=1, help="offices joined end to end, 1 to 12; 1 by default")
+    office.add_argument(
+        "--wing-angle", type=_number, default=30.0, metavar="DEG", help="of each to the one before; 30 by default"
+    )
     _seed(office, "windows, doors and furniture")
-    for name, text in (("plant", "a process plant's hall"), ("city", "a quarter of a city")):
-        scaled = _command(buildings, name, "make_scaled", f"Make {text} of any size and print its size.")
-        scaled.set_defaults(building=name)
-        scaled.add_argument(
+    for name, text, counts in (
+        ("plant", "a process plant's hall of any size", {"triangles": (100_000, "about how many; 100,000 by default")}),
+        ("city", "a quarter of a city of any size", {"triangles": (100_000, "about how many; 100,000 by default")}),
+        (
+            "rotunda",
+            "rooms round a ring corridor and a court",
+            {"sides": (6, "of the building, 3 to 64; 6 by default")},
+        ),
+        (
+            "arcade",
+            "a corridor with arched windows and an octagonal passage",
+            {"windows": (8, "1 to 100; 8 by default"), "segments": (12, "straight pieces of an arch; 12 by default")},
+        ),
+    ):
+        other = _command(buildings, name, "make_other", f"Make {text} and print its size.")
+        other.set_defaults(building=name, counts=list(counts))
+        other.add_argument(
             "--out", default=f"{name}.scene", help=f"X.scene (ready to bake) or X.glb; {name}.scene by default"
         )
-        scaled.add_argument("--triangles", type=_whole(1), default=100_000, help="about how many; 100,000 by default")
-        _seed(scaled, "what stands where")
+        for count, (usual, what) in counts.items():
+            other.add_argument(f"--{count}", type=_whole(1), default=usual, help=what)
+        _seed(other, "what stands where")
 
 
 def _add_inspect(commands: argparse._SubParsersAction) -> None:

@@ -31,7 +31,8 @@ def make_office(options: argparse.Namespace) -> int:
     size = {name: value for name, value in size.items() if value is not None}
     if options.like and size:
         raise InputError(f"like: expected no other size beside {options.like}, found {', '.join(size)}")
-    scene = build(seed=options.seed, like=options.like, **size)
+    turn = {"yaw_deg": options.yaw, "wings": options.wings, "wing_angle_deg": options.wing_angle}
+    scene = build(seed=options.seed, like=options.like, **size, **turn)
     write(scene, out)
     rows = [(r.level, r.objects, r.polygons, r.minimum, f"{r.mean:,.2f}", r.maximum) for r in level_statistics(scene)]
     say(table(("level of detail", "objects", "polygons", "min per object", "mean", "max"), rows))
@@ -39,15 +40,17 @@ def make_office(options: argparse.Namespace) -> int:
     return 0
 
 
-def make_scaled(options: argparse.Namespace) -> int:
-    """Make a plant or a city of about so many triangles, write it and print its size."""
+def make_other(options: argparse.Namespace) -> int:
+    """Make a plant, a city, a rotunda or an arcade, write it and print its size."""
+    from ..data.buildings.arcade import make_arcade
     from ..data.buildings.city import make_city
     from ..data.buildings.plant import make_plant
+    from ..data.buildings.rotunda import make_rotunda
     from ..data.buildings.statistics import level_statistics
 
     out, write = _scene_writer(options.out)
-    build = {"plant": make_plant, "city": make_city}[options.building]
-    scene = build(seed=options.seed, triangles=options.triangles)
+    build = {"plant": make_plant, "city": make_city, "rotunda": make_rotunda, "arcade": make_arcade}[options.building]
+    scene = build(seed=options.seed, **{count: getattr(options, count) for count in options.counts})
     write(scene, out)
     size = (level_statistics(scene)[-1].polygons, len(scene.objects), len(scene.definitions), len(scene.spaces))
     say(table(("triangles", "objects", "definitions", "spaces"), [size]))

@@ -6,8 +6,8 @@ from itertools import zip_longest
 import numpy as np
 
 from ..errors import InputError
-from ..scene import Instance, Role
-from .furniture import PIECES, Place
+from ..scene import Definition, Instance, Role
+from .furniture import FURNITURE, PIECES, Place
 
 SLOT_M = 1.2
 WALL_GAP_M = 0.65
@@ -15,6 +15,21 @@ DOOR_GAP_M = 1.0
 LAMP_GAP_M = 2.5
 # Round things may stand at any angle; the others stand square to the walls.
 TURNED = ("chair", "plant", "telephone", "lamp")
+# Area in m2 for each piece of furniture, hosts before what stands on them.
+AREA_M2 = {
+    "desk": 12.0,
+    "shelf": 16.0,
+    "table": 30.0,
+    "plant": 40.0,
+    "sofa": 60.0,
+    "chair": 8.0,
+    "terminal": 18.0,
+    "lamp": 20.0,
+    "telephone": 24.0,
+    "tumbler": 12.0,
+    "pencil": 8.0,
+    "book": 2.0,
+}
 
 
 @dataclass
@@ -95,6 +110,50 @@ def free_slots(rooms: list[Room], door_faces: list[tuple[np.ndarray, float]], rn
     return Slots(
         {Place.FLOOR: floor, Place.TOP: [], Place.BOARD: [], Place.CEILING: ceiling, Place.DOOR: list(door_faces)}, rng
     )
+
+
+def gathered(parts: list[tuple[Slots, np.ndarray]], rng: np.random.Generator) -> Slots:
+    """Places of several parts of a building, each in a frame of its own, shape (4, 4); one of each part in turn."""
+    free = {}
+    for place in Place:
+        columns = []
+        for slots, frame in parts:
+            turn = float(np.arctan2(frame[1, 0], frame[0, 0]))
+            columns.append([(_at(frame, position), angle + turn) for position, angle in slots.free[place]])
+        free[place] = [slot for row in zip_longest(*columns) for slot in row if slot is not None]
+    return Slots(free, rng)
+
+
+def furniture_shapes() -> list[Definition]:
+    """A shape for each piece, in the order of `FURNITURE`."""
+    return [piece.definition() for piece in FURNITURE]
+
+
+def wanted_pieces(rooms: list[Room], slots: Slots) -> dict[str, int]:
+    """Furniture for rooms of this area, hosts first; on the floor no more than there are places."""
+    area, left = sum(room.area for room in rooms if room.furnished), len(slots.free[Place.FLOOR])
+    wanted = {name: max(1, round(area / each)) for name, each in AREA_M2.items()}
+    for name in wanted:
+        if PIECES[name].place is Place.FLOOR:
+            wanted[name] = min(wanted[name], left)
+            left -= wanted[name]
+    return wanted | fixed_pieces(slots)
+
+
+def fixed_pieces(slots: Slots) -> dict[str, int]:
+    """A handle on each face of a door, and a lamp at each place for one."""
+    return {name: len(slots.free[PIECES[name].place]) for name in ("door handle", "ceiling lamp")}
+
+
+def placed_pieces(slots: Slots, wanted: dict[str, int], first: int) -> list[Instance]:
+    """So many of each piece, in the order given; `first` is the definition of the first piece."""
+    ids = {piece.name: first + i for i, piece in enumerate(FURNITURE)}
+    placed: list[Instance] = []
+    for name, count in wanted.items():
+        if name == "terminal":  # all hosts stand: what follows is spread over them
+            slots.mix_tops()
+        placed += slots.place(name, count, ids[name])
+    return placed
 
 
 def _floor_slots(room: Room, rng: np.random.Generator) -> list[tuple[np.ndarray, float]]:

@@ -3,29 +3,16 @@
 import numpy as np
 
 from ..errors import InputError
-from ..scene import GRID_M, Instance, Scene
-from .furnish import Room, Slots, free_slots
-from .furniture import FURNITURE, PIECES
-from .plans import office_plan, soda_hall_plan
-from .shell import Shell
+from ..scene import GRID_M, Scene
+from .furnish import Slots, fixed_pieces, free_slots, furniture_shapes, placed_pieces, turned, wanted_pieces
+from .furniture import FURNITURE
+from .plans import Plan, office_plan, soda_hall_plan
+from .shell import OUTER_WALL_M, Shell
 from .statistics import level_statistics
+from .wings import LETTERS, build_foyer, join_wings
+from .works import Works
 
 MODELS = (None, "soda-hall")
-# Area in m2 for each piece of furniture, hosts before what stands on them.
-AREA_M2 = {
-    "desk": 12.0,
-    "shelf": 16.0,
-    "table": 30.0,
-    "plant": 40.0,
-    "sofa": 60.0,
-    "chair": 8.0,
-    "terminal": 18.0,
-    "lamp": 20.0,
-    "telephone": 24.0,
-    "tumbler": 12.0,
-    "pencil": 8.0,
-    "book": 2.0,
-}
 # Funkhouser et al. 1996, Table 1: objects that have at least 1, 2, ... 5 levels, and polygons of the coarsest.
 SODA_OBJECTS = (14478, 3954, 2497, 949, 437)
 SODA_COARSEST_POLYGONS = 240149
@@ -38,9 +25,12 @@ def make_office(
     seed: int = 0,
     like: str | None = None,
     furnished: bool = True,
+    yaw_deg: float = 0.0,
+    wings: int = 1,
+    wing_angle_deg: float = 30.0,
     grid_m: float = GRID_M,
 ) -> Scene:
-    """An office building whose walls are axial and exact on the grid.
+    """An office building; its walls are axial and exact on the grid, unless it is turned or has wings.
 
     Every floor, north up (o: office, d: door, =: window, the stair and the open-plan area half way along):
 
@@ -64,65 +54,77 @@ def make_office(
             and the polygons of each level of detail as in Table 1 of Funkhouser et al. 1996, within 5 %; `floors`,
             `rooms_per_side` and `furnished` then have no effect.
         furnished: whether furniture stands in the rooms.
+        yaw_deg: the building is turned by this, counter-clockwise about its south-west corner [degrees].
+        wings: offices that are joined by foyers at the ends of their corridors, 1 to 12; not beside `like`.
+        wing_angle_deg: by which each is turned relative to the one before, -120 to 120 [degrees].
         grid_m: grid step [m].
 
     Returns:
         The same scene for the same arguments, on every machine.
 
     Raises:
-        InputError: a number is out of range or `like` is unknown.
+        InputError: a number is out of range, `like` is unknown, or wings would overlap.
     """
     if like not in MODELS:
         raise InputError(f"like: expected soda-hall or nothing, found {like!r}")
     if seed < 0:
         raise InputError(f"seed: expected 0 or more, found {seed}")
+    if not abs(yaw_deg) <= 360.0:
+        raise InputError(f"yaw_deg: expected degrees up to 360, found {yaw_deg:g}")
+    if like and wings != 1:
+        raise InputError(f"wings: expected 1 beside like {like!r}, found {wings}")
     rng = np.random.default_rng(seed)
-    shell = Shell(office_plan(floors, rooms_per_side) if like is None else soda_hall_plan(), rng)
-    shell.build()
+    plan = office_plan(floors, rooms_per_side) if like is None else soda_hall_plan()
+    size = Shell(plan, rng).footprint()
+    frames, joints = join_wings(size, wings, wing_angle_deg, turned(np.zeros(3), np.radians(yaw_deg)))
     source = f"make_office(floors={floors}, rooms_per_side={rooms_per_side}, seed={seed}, furnished={furnished})"
+    source = source if like is None else f"make_office(like={like!r}, seed={seed})"
+    if wings == 1 and yaw_deg == 0.0:
+        return _wing(plan, rng, (False, False), furnished, like, grid_m, source)
+    works = Works()
+    for number, frame in enumerate(frames):
+        joined = number > 0, number < wings - 1
+        name = f"{LETTERS[number]} " if wings > 1 else ""
+        works.take(_wing(plan, rng, joined, furnished, like, grid_m, ""), frame, name)
+    for number, joint in enumerate(joints):
+        name = f"{LETTERS[number]}-{LETTERS[number + 1]} foyer"
+        build_foyer(works, joint, name, Shell(plan, rng).levels(), OUTER_WALL_M)
+    turn = f", yaw_deg={yaw_deg:g}, wings={wings}, wing_angle_deg={wing_angle_deg:g})"
+    return works.scene(source.removesuffix(")") + turn, grid_m)
+
+
+def _wing(
+    plan: Plan,
+    rng: np.random.Generator,
+    joined: tuple[bool, bool],
+    furnished: bool,
+    like: str | None,
+    grid_m: float,
+    source: str,
+) -> Scene:
+    """One office on the axes, `joined` to others at its west and its east end."""
+    shell = Shell(plan, rng, joined)
+    shell.build()
     scene = Scene(
         definitions=shell.definitions,
         objects=shell.objects,
         spaces=shell.spaces(),
         openings=np.array(shell.openings).reshape(-1, 2, 3),
         grid_m=grid_m,
-        source=source if like is None else f"make_office(like={like!r}, seed={seed})",
+        source=source,
     )
     if furnished or like:
         slots = free_slots(shell.rooms(), shell.door_faces, rng)
-        wanted = _soda_numbers(scene, slots) if like else _numbers(shell.rooms(), slots)
-        _furnish(scene, slots, wanted)
+        wanted = _soda_numbers(scene, slots) if like else wanted_pieces(shell.rooms(), slots)
+        first = len(scene.definitions)
+        scene.definitions.extend(furniture_shapes())
+        scene.objects.extend(placed_pieces(slots, wanted, first))
     return scene
-
-
-def _furnish(scene: Scene, slots: Slots, wanted: dict[str, int]) -> None:
-    """Place so many of each piece, in the order given."""
-    first = len(scene.definitions)
-    scene.definitions.extend(piece.definition() for piece in FURNITURE)
-    ids = {piece.name: first + i for i, piece in enumerate(FURNITURE)}
-    placed: list[Instance] = []
-    for name, count in wanted.items():
-        if name == "terminal":  # all hosts stand: what follows is spread over them
-            slots.mix_tops()
-        placed += slots.place(name, count, ids[name])
-    scene.objects.extend(placed)
-
-
-def _numbers(rooms: list[Room], slots: Slots) -> dict[str, int]:
-    """Furniture for a building of this area."""
-    area = sum(room.area for room in rooms if room.furnished)
-    wanted = {name: max(1, round(area / each)) for name, each in AREA_M2.items()}
-    return wanted | _fixed(slots)
-
-
-def _fixed(slots: Slots) -> dict[str, int]:
-    """A handle on each face of a door, and a lamp at each place for one."""
-    return {name: len(slots.free[PIECES[name].place]) for name in ("door handle", "ceiling lamp")}
 
 
 def _soda_numbers(scene: Scene, slots: Slots) -> dict[str, int]:
     """Furniture that brings the building to Soda Hall's objects at each level, and its polygons at the coarsest."""
-    fixed = _fixed(slots)
+    fixed = fixed_pieces(slots)
     fifth = SODA_OBJECTS[4]
     fourth, third, second = (SODA_OBJECTS[i] - SODA_OBJECTS[i + 1] for i in (3, 2, 1))
     second -= fixed["door handle"]

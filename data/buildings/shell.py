@@ -20,6 +20,7 @@ WALL_M = 8 / 32
 SLAB_M = 10 / 32
 STOREY_M = 3.5
 DOOR_M = 1.0
+PASSAGE_M = 1.5
 HEAD_M = 68 / 32
 SILL_M = 1.0
 LEAF_M = 2 / 32
@@ -55,12 +56,15 @@ class Shell:
     """The building without furniture; `build` fills it.
 
     Attributes:
+        joined: whether the west and the east ends of corridors open into another wing, in place of an entrance and
+            of windows.
         rows: rooms by floor and row, from the west.
         door_faces: where handles go [m], and the angle that turns +y away from the door.
     """
 
     plan: Plan
     rng: np.random.Generator
+    joined: tuple[bool, bool] = (False, False)
     definitions: list[Definition] = field(default_factory=list)
     objects: list[Instance] = field(default_factory=list)
     rows: list[list[list[Room]]] = field(default_factory=list)
@@ -95,6 +99,15 @@ class Shell:
         """The rooms as closed boxes."""
         boxes = [(room.name, pierced_block(room.low, room.high, [])) for room in self.rooms()]
         return [Space(name, box.vertices, box.faces) for name, box in boxes]
+
+    def footprint(self) -> tuple[float, float]:
+        """Length and width over all [m]; the south-west corner is the origin."""
+        east, north = self._inner()[1] + OUTER_WALL_M
+        return float(east), float(north)
+
+    def levels(self) -> list[tuple[float, float]]:
+        """Floor and ceiling of each storey [m]."""
+        return [self._levels(floor) for floor in range(len(self.plan.floors))]
 
     def _inner(self) -> np.ndarray:
         """Rectangle within the outer walls [m], shape (2, 2): low, high."""
@@ -208,17 +221,15 @@ class Shell:
                 east = room.high[0] + WALL_M if number < len(row) - 1 else outer[1, 0]
                 box = np.array([[west, y[0], foot - SLAB_M], [east, y[1], ceiling]])
                 self._wall(f"{side} wall of {room.name}", box, 0, self._outer_openings(room, floor))
-        for side, x in (("west", (outer[0, 0], inner[0, 0])), ("east", (inner[1, 0], outer[1, 0]))):
+        ends = ("west", (outer[0, 0], inner[0, 0])), ("east", (inner[1, 0], outer[1, 0]))
+        for (side, x), joined in zip(ends, self.joined, strict=True):
             for band, (south, north) in enumerate(bands):
                 box = np.array([[x[0], south, foot - SLAB_M], [x[1], north, ceiling]])
                 box[1, 1] += WALL_M if band < len(bands) - 1 else 0.0
                 openings = []
                 if band % 2:
-                    low, high = (south + north - DOOR_M) / 2, (south + north + DOOR_M) / 2
                     entrance = side == "west" and floor == 0
-                    openings = [
-                        Opening(low, high, filling="door") if entrance else Opening(low, high, SILL_M, filling="window")
-                    ]
+                    openings = [_corridor_end((south + north) / 2, joined, entrance)]
                 self._wall(f"{side} wall {floor + 1}.{band + 1}", box, 1, openings)
 
     def _outer_openings(self, room: Room, floor: int) -> list[Opening]:
@@ -294,6 +305,16 @@ class Shell:
             self.objects.append(
                 Instance(f"stair of {room.name}", "IfcStair", self._known[key], turned(foot, 0.0), Role.OCCLUDER)
             )
+
+
+def _corridor_end(middle: float, joined: bool, entrance: bool) -> Opening:
+    """What a corridor ends in: a passage into another wing, an entrance, or a window."""
+    half = (PASSAGE_M if joined else DOOR_M) / 2
+    if joined:
+        return Opening(middle - half, middle + half)
+    if entrance:
+        return Opening(middle - half, middle + half, filling="door")
+    return Opening(middle - half, middle + half, SILL_M, filling="window")
 
 
 def _unit_middles(room: Room) -> list[float]:

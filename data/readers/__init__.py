@@ -4,6 +4,7 @@ import hashlib
 from pathlib import Path
 
 from ..errors import InputError
+from ..frame import in_frame
 from ..scene import GRID_M, Scene, source_path
 from .assemble import Model
 from .roles import RoleRules
@@ -39,7 +40,7 @@ def read(
         doors_by: in place of the words for doors.
         leave_out: parts whose name, GUID or kind it finds are not read.
         yaw: what the model is turned back by about the vertical [degrees], or "auto" for the angle at which most of its
-            walls stand; see `Scene.in_model`.
+            walls stand; see `Scene.in_model`. At 0, the default, a scene folder stays as it was written.
         grid_m: grid step [m].
 
     Raises:
@@ -55,7 +56,7 @@ def read(
     if not 0.0 < grid_m < float("inf"):
         raise InputError(f"grid step: expected a positive length in metres, found {grid_m!r}")
     if path.is_dir():
-        return _read_folder(path, grid_m)
+        return in_frame(_read_folder(path, grid_m), yaw)
     suffix = path.suffix.lower()
     if suffix == ".map":
         how = "compile it with qbsp of ericw-tools, and read the .bsp"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import InputError
-from ..frame import wall_yaw
+from ..frame import turn_note, wall_yaw
 from ..scene import GRID_LIMIT, Definition, Instance, Mesh, Role, Scene, Space, degenerate, snap, turned
 
 MAX_COORDINATE_M = 1.0e9
@@ -119,7 +119,7 @@ def _yaw(parts: list[Part], model: Model) -> float:
         return float(model.yaw)
     yaw_deg = wall_yaw([(part.placed(), part.faces) for part in parts if part.role is Role.OCCLUDER])
     if yaw_deg:
-        model.note("walls", f"most of their area stands at {yaw_deg:g} degrees: the model is turned back by as much")
+        model.notes.append(turn_note(yaw_deg))
     return yaw_deg
 
 

@@ -4,17 +4,20 @@ import numpy as np
 import pytest
 import trimesh
 from builders import random_solids
+from viewcell.data.buildings.glb import write_glb
+from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
-from viewcell.data.frame import wall_yaw
+from viewcell.data.frame import in_frame, wall_yaw
 from viewcell.data.prepared import PreparedModel
 from viewcell.data.readers import read
-from viewcell.data.scene import turned
+from viewcell.data.scene import boxes_around, turned
 from viewcell.data.store.bake_folder import read_bake
 from viewcell.data.store.scene_folder import read_scene, write_scene
 from viewcell.workbench.bake.run import bake
 from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.check.run import check
 from viewcell.workbench.cli import main
+from viewcell.workbench.inspect.run import inspect
 from viewcell.workbench.summary import summary
 
 WALL = np.array([[0, 0, 0], [4, 0, 0], [4, 0, 3], [0, 0, 3]], float)
@@ -41,6 +44,19 @@ def test_the_larger_area_counts_and_not_the_mean():
     assert wall_yaw([(wall(-0.0004), FACES), (wall(0.0004), FACES), (wall(20, 1.5), FACES)]) == pytest.approx(
         0, abs=1e-6
     )
+
+
+def test_of_as_many_at_each_angle_those_along_the_axes_count():
+    """The walls of a hexagon, and none by a digit more than the others."""
+    for rounded in (-1e-12, 0.0, 1e-12):
+        walls = [(wall(angle, 1.0 + rounded * (angle % 90 == 30)), FACES) for angle in range(0, 360, 60)]
+        assert wall_yaw(walls) == 0.0
+    assert wall_yaw([(wall(angle), FACES) for angle in (20, 80, 140)]) == pytest.approx(-10)
+
+
+@pytest.mark.parametrize("off", [-1e-9, 0.0, 1e-9])
+def test_a_digit_does_not_decide_for_a_quarter_turn(off):
+    assert wall_yaw([(wall(45.0 + off), FACES)]) == 45.0
 
 
 def test_floors_stand_nowhere():
@@ -130,3 +146,84 @@ def test_a_given_yaw_is_taken(tmp_path):
     assert scene.yaw_deg == -73.0 and PreparedModel(scene).planes.axial_area > 0
     corner = trimesh.bounds.corners(scene.object_bounds()[0] * scene.grid_m)
     assert np.ptp(corner, axis=0)[:2] == pytest.approx([4.0, 8.0], abs=2e-3)
+
+
+def pairs(made):
+    """What a bake says of each pair, by ids."""
+    objects, cells = made.cell_to_object, made.cell_to_cell
+    return [
+        list(zip(*(table[name].to_pylist() for name in names), strict=True))
+        for table, names in (
+            (objects, ("cell_id", "object_id", "verdict")),
+            (cells, ("cell_id", "reached_cell_id", "verdict")),
+        )
+    ]
+
+
+def assert_baked_alike(tmp_path, yaw_deg, **size):
+    plain = bake(make_office(**size), tmp_path / "plain", threads=1)
+    scene = make_office(yaw_deg=yaw_deg, **size)
+    write_scene(scene, tmp_path / "turned.scene")
+    made = bake(tmp_path / "turned.scene", tmp_path / "turned", threads=1)
+    assert plain.manifest["yaw_deg"] == 0.0 and made.manifest["yaw_deg"] == yaw_deg
+    assert pairs(made) == pairs(plain)
+    # A scene is taken as its folder is: the bake is up to date.
+    assert bake(scene, tmp_path / "turned", threads=1).manifest == made.manifest
+
+
+@pytest.mark.parametrize("yaw_deg", [5.0, 17.0, 30.0, 45.0])
+def test_a_turned_office_is_baked_as_one_on_the_axes(yaw_deg, tmp_path):
+    assert_baked_alike(tmp_path, yaw_deg, floors=2, rooms_per_side=1)
+
+
+def test_claims_about_a_turned_scene_are_judged_in_the_frame_of_its_bake(tmp_path):
+    scene = read(house(tmp_path / "a.obj", 17.0))
+    write_scene(scene, tmp_path / "a.scene")
+    made = bake(tmp_path / "a.scene", tmp_path / "a", threads=1)
+    assert made.manifest["yaw_deg"] == pytest.approx(17.0)
+    for model in (scene, tmp_path / "a.scene", made.folder):
+        assert check(model, made.folder, made.folder, rays=5_000).ok
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("yaw_deg", [5.0, 17.0, 30.0, 45.0])
+def test_the_default_office_turned_is_baked_as_one_on_the_axes(yaw_deg, tmp_path):
+    assert_baked_alike(tmp_path, yaw_deg)
+
+
+def test_scenes_are_turned_as_files_are(tmp_path):
+    plain, scene = make_office(floors=1, rooms_per_side=1), make_office(floors=1, rooms_per_side=1, yaw_deg=17.0)
+    back = in_frame(scene, "auto")
+    np.testing.assert_array_equal(back.triangles()[0], plain.triangles()[0])
+    assert back.yaw_deg == 17.0 and "17 degrees" in back.notes[-1]["why"] and scene.notes == []
+    for room, stood in zip(back.spaces, plain.spaces, strict=True):
+        np.testing.assert_allclose(room.vertices, stood.vertices, atol=1e-9)
+    # Boxes around turned boxes: none is lost, and none grows by more than its own width.
+    assert (back.openings[:, 0] <= plain.openings[:, 0] + 1e-9).all()
+    assert (back.openings[:, 1] >= plain.openings[:, 1] - 1e-9).all()
+    size = np.diff(plain.openings, axis=1)[:, 0, :2]
+    assert (np.diff(back.openings, axis=1)[:, 0, :2] <= size.sum(axis=1, keepdims=True) + 1e-9).all()
+    # What is turned already is not turned again, and a given angle is the whole angle.
+    assert in_frame(back, "auto") is back and in_frame(back, 17.0) is back and in_frame(scene, 0.0) is scene
+    write_scene(back, tmp_path / "back.scene")
+    assert read(tmp_path / "back.scene", yaw=17.0).yaw_deg == 17.0
+    np.testing.assert_allclose(read(tmp_path / "back.scene", yaw=27.0).objects[5].transform[:2, 0], turned(
+        scene.objects[5].transform[:3, 0], -27.0)[:2], atol=1e-12)  # fmt: skip
+    assert inspect(scene, estimate=False).scene.yaw_deg == 17.0
+
+
+def test_a_box_around_a_turned_box():
+    quarter = np.eye(4)
+    quarter[:3, :3] = turned(np.eye(3), 90.0).T
+    quarter[:3, 3] = 10, 0, 0
+    found = boxes_around(np.array([[[1.0, 2, 3], [4, 6, 8]]]), quarter)
+    np.testing.assert_allclose(found, [[[4.0, 1, 3], [8, 4, 8]]], atol=1e-12)
+
+
+def test_a_turned_office_as_a_file_is_baked_as_one_on_the_axes(tmp_path):
+    for name, yaw_deg in (("plain", 0.0), ("turned", 17.0)):
+        write_glb(make_office(floors=1, rooms_per_side=1, yaw_deg=yaw_deg), tmp_path / f"{name}.glb")
+    plain, made = (bake(tmp_path / f"{name}.glb", tmp_path / name, threads=1) for name in ("plain", "turned"))
+    assert made.manifest["yaw_deg"] == pytest.approx(17.0, abs=1e-5)
+    assert made.manifest["counts"]["cells"] == plain.manifest["counts"]["cells"]
+    assert made.potential_objects.sum() == plain.potential_objects.sum()

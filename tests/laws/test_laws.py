@@ -15,6 +15,7 @@ import pytest
 import viewcell
 from hypothesis import HealthCheck, Phase, assume, given, settings
 from viewcell.data.graph import OTHER_AXES
+from viewcell.data.readers import frame
 from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
 from viewcell.data.store.bake_folder import cells_table, portals_table
 from viewcell.data.verdict import Verdict
@@ -30,6 +31,8 @@ from viewcell.verify.strategies import MODULE, buildings, knapsacks, occluded_pa
 from viewcell.workbench.bake import cells as baked_cells
 from viewcell.workbench.bake.settings import Settings
 
+# Up to a quarter turn: further, another side of the building lies along each axis.
+YAWS_DEG = (17.0, 5.0, -30.0, 45.0, 0.5)
 BAKES = settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
 # A law is broken on the same examples every time, and it is enough to see that it is.
 BROKEN = settings(
@@ -137,6 +140,32 @@ def law_a_shift_changes_nothing(building):
     scene = replace(building.scene, objects=objects, spaces=[])
     truth, moved = by_occluders(building), baked(scene, method="occluders", cells=cells)
     assert np.array_equal(truth.potential_objects, moved.potential_objects)
+
+
+def law_a_turn_changes_nothing(building):
+    """Of a model: it is turned back before it is snapped, and is then the same model, witnesses included."""
+    truth, turned = baked(replace(building, yaw_deg=0.0).scene), baked(building.scene)
+    assert turned.manifest["yaw_deg"] == building.yaw_deg and truth.manifest["yaw_deg"] == 0.0
+    assert turned.cell_to_object.equals(truth.cell_to_object)
+    assert turned.cell_to_cell.equals(truth.cell_to_cell)
+
+
+def law_a_wing_sees_itself_as_if_it_were_alone(building):
+    """What the first of several wings sees of itself is the same, whether it ends in the open or in a foyer.
+
+    It is convex and the others lie outside, so that no line between two points of it meets them. Through an end without
+    a passage nothing of the others shows.
+    """
+    assume(building.wings > 1)
+    scene, rooms = building.scene, int(np.prod(building.rooms))
+    own = [number for number, placed in enumerate(scene.objects) if placed.name.startswith("A ")]
+    cells = {name: values[:rooms] for name, values in building.view_cells.items()}
+    alone = replace(scene, objects=[scene.objects[number] for number in own], spaces=[])
+    joined, single = (baked(model, method="occluders", cells=cells) for model in (scene, alone))
+    assert not (seen(joined)[:, own] & ~single.potential_objects).any()
+    assert not (seen(single) & ~joined.potential_objects[:, own]).any()
+    if not any(door.axis == 0 and door.room[0] == building.rooms[0] - 1 for door in building.doors):
+        assert not np.delete(seen(joined), own, axis=1).any()
 
 
 def law_a_mirror_reveals_nothing(building):
@@ -254,6 +283,8 @@ LAWS = {
     law_stabbing_is_exact: portal_sequences(),
     law_motion_changes_nothing: buildings(columns=3, rows=2, furniture=0),
     law_a_shift_changes_nothing: buildings(columns=2, rows=2),
+    law_a_turn_changes_nothing: buildings(columns=2, rows=2, yaw=YAWS_DEG),
+    law_a_wing_sees_itself_as_if_it_were_alone: buildings(columns=2, rows=1, wings=3),
     law_a_mirror_reveals_nothing: buildings(columns=2, rows=2),
     law_sight_is_mutual: buildings(columns=3, rows=2, storeys=2, furniture=0),
     law_an_occluder_reveals_nothing: buildings(columns=3, rows=1),
@@ -313,6 +344,11 @@ def anchored_tree(blockers, device=CPU, original=occluders.blocker_tree):
     return original(replace(blockers, boxes=boxes), device)
 
 
+def askew(points, yaw_deg, original=frame.turned):
+    """A turn that is short by a thousandth."""
+    return original(points, yaw_deg * 0.999)
+
+
 def lost_remainder(tree, boxes, rows, original=occluders.launch_target_search, **options):
     """The last batch of eight, if it is not full, is never looked at."""
     answers = original(tree, boxes, rows, **options)
@@ -365,6 +401,8 @@ def sure(*arguments, **options):
 BREAKS = {
     law_motion_changes_nothing: (baked_cells, "read_graph", half_portals),
     law_a_shift_changes_nothing: (occluders, "blocker_tree", anchored_tree),
+    law_a_turn_changes_nothing: (frame, "turned", askew),
+    law_a_wing_sees_itself_as_if_it_were_alone: (occluders, "launch_target_search", lost_remainder),
     law_a_mirror_reveals_nothing: (occluders, "blocker_tree", one_sided_tree),
     law_sight_is_mutual: (graph_engine, "join_cell_rows", forward_join),
     law_an_occluder_reveals_nothing: (occluders, "launch_target_search", lost_remainder),

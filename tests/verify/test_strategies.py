@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import find, given, settings
 from hypothesis import strategies as st
-from viewcell.data.scene import Role
-from viewcell.data.solids import is_closed
+from viewcell.data.scene import GRID_M, Role
+from viewcell.data.solids import SolidIndex, closed_elements, is_closed, winding_numbers
 from viewcell.data.store.graph_folder import check_graph
 from viewcell.data.verdict import Verdict
 from viewcell.verify import strategies
@@ -20,7 +20,10 @@ from viewcell.verify.strategies import WALL, Building, Door, buildings, knapsack
 NAMES = {name: getattr(strategies, name) for name in ("PortalSequence", "OccludedPair", "Knapsack", "Building", "Door")}
 
 
-@given(st.one_of(portal_sequences(), occluded_pairs(), knapsacks(), buildings(storeys=2)))
+TURNS = (0.0, 17.0, 45.0, -30.0)
+
+
+@given(st.one_of(portal_sequences(), occluded_pairs(), knapsacks(), buildings(storeys=2, yaw=TURNS, wings=3)))
 def test_examples_can_be_pasted(example):
     text = repr(example)
     assert eval(text, dict(NAMES)) == example
@@ -116,6 +119,52 @@ def test_buildings_are_solid(building):
     volume = (high - low).prod(axis=1).sum() + sum((box[1] - box[0]).prod() for box in building.graph().cells)
     assert volume == size.prod()
     check_graph(building.graph(), "building")
+
+
+@given(buildings(columns=2, yaw=TURNS, wings=3))
+def test_wings_and_turned_buildings_are_whole(building):
+    scene, rooms = building.scene, int(np.prod(building.rooms))
+    triangles, owners = scene.triangles()
+    assert all(is_closed(triangles[owners == k]) for k in range(len(scene.objects) - 1, 0, -5))
+    assert len(scene.spaces) == rooms * building.wings + building.wings - 1
+    table = building.view_cells
+    boxes = np.array([[table[f"{end}_{axis}"] for axis in "xyz"] for end in ("min", "max")]).transpose(2, 0, 1)
+    assert len(boxes) == rooms * building.wings and (boxes[:, 0] < boxes[:, 1]).all()
+    # Each view cell lies in its room, corners included.
+    wide = [space for space in scene.spaces if "room" in space.name]
+    for box, space in zip(boxes, wide, strict=True):
+        inner = (box - box.mean(axis=0)) * 0.99 + box.mean(axis=0)
+        corners = inner[strategies.CORNERS, np.arange(3)]
+        assert (winding_numbers(corners, space.vertices[space.faces]) > 0.5).all()
+    if building.wings > 1:
+        low, high = scene.object_bounds().min(axis=0)[0], scene.object_bounds().max(axis=0)[1]
+        assert np.linalg.norm((high - low)[:2]) > np.linalg.norm(building.rooms[:2]) * strategies.MODULE
+
+
+def test_a_building_on_the_axes_is_made_of_its_boxes():
+    building = Building((2, 1, 1), (Door((0, 0, 0), 0, (0, 0), (100, 500)),), (((70, 70, 70), (90, 100, 80)),))
+    boxes = building.scene.object_bounds()
+    np.testing.assert_array_equal(boxes, np.array([*building.solids, *building.furniture]))
+    assert [placed.name for placed in building.scene.objects][-2:] == [
+        f"wall {len(building.solids) - 1}",
+        "furniture 0",
+    ]
+    assert building.view_cells["max_x"] == [960 / 1024, 1984 / 1024] and building.view_cells["cell_id"] == [0, 1]
+
+
+def test_a_passage_leads_from_wing_to_wing():
+    door = Door((0, 0, 0), 0, (0, 0), (400, 700))
+    open_, shut = (Building((1, 1, 1), doors, wings=2, wing_angle_deg=30.0) for doors in ((door,), ()))
+    # The first wing is open at its east end, the second at its west end; both are closed at the others.
+    assert len(open_.solids) == len(shut.solids) + 2
+    for number, hole in ((0, [[1.0, 0.3, 0.3]]), (1, [[0.0, 0.3, 0.3]])):
+        frame = open_.frames[0][number]
+        points = (np.array(hole) @ frame[:3, :3].T + frame[:3, 3]) / GRID_M
+        for building, outside in ((open_, True), (shut, False)):
+            solid = SolidIndex(np.array([[points[0], points[0]]]), closed_elements(building.scene))
+            assert solid.outside(points, 0)[0] == outside
+    names = [placed.name for placed in open_.scene.objects]
+    assert {name.split()[0] for name in names} == {"A", "B", "slab", "inner", "outer", "roof"}
 
 
 def test_a_door_that_does_not_line_up_by_a_step():

@@ -99,6 +99,34 @@ def test_make_office(tmp_path, capsys):
     assert polygons == sum(len(scene.definitions[x.definition_id].lods[0].faces) for x in scene.objects)
 
 
+def test_make_an_office_with_wings(tmp_path, capsys):
+    out, size = str(tmp_path / "a.scene"), ["--floors", "1", "--rooms-per-side", "1"]
+    turn = ["--yaw", "17", "--wings", "2", "--wing-angle", "-40"]
+    assert main(["make", "office", *size, *turn, "--out", out]) == 0
+    assert "written to" in capsys.readouterr().out
+    made = viewcell.make_office(floors=1, rooms_per_side=1, yaw_deg=17, wings=2, wing_angle_deg=-40)
+    assert viewcell.read(out).source == made.source and len(viewcell.read(out).objects) == len(made.objects)
+    assert main(["make", "office", *size, "--wings", "9", "--wing-angle", "60", "--out", out]) == 2
+    complaint = capsys.readouterr().err
+    assert "expected wings that stand clear of each other" in complaint and complaint.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "source"),
+    [
+        (["rotunda", "--sides", "5"], "make_rotunda(sides=5, seed=2"),
+        (["arcade", "--windows", "2", "--segments", "4"], "make_arcade(windows=2, segments=4, seed=2"),
+    ],
+)
+def test_make_other_buildings(arguments, source, tmp_path, capsys):
+    assert main(["make", *arguments, "--seed", "2", "--out", str(tmp_path / "a.scene")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    scene = viewcell.read(tmp_path / "a.scene")
+    assert scene.source.startswith(source) and len(scene.objects) == int(lines[1].split()[1])
+    assert main(["make", arguments[0], arguments[1], "1000", "--out", str(tmp_path / "b.scene")]) == 2
+    assert f"{arguments[1][2:]}: expected" in capsys.readouterr().err and not (tmp_path / "b.scene").exists()
+
+
 def test_up_and_unit_reach_the_reader(tmp_path, monkeypatch):
     seen = {}
 

@@ -119,12 +119,15 @@ def bake(
 
 def _open(model: Scene | str | Path, settings: Settings) -> tuple[Scene | None, Path | None]:
     if isinstance(model, Scene):
-        return model, None
+        from ...data.frame import in_frame
+
+        return in_frame(model, settings.frame.get("yaw", 0.0)), None
     path = Path(model)
-    told = [*settings.reading, *(["yaw"] if settings.yaw != "auto" else [])]
+    bare = path.is_dir() and not (path / "manifest.json").exists()
+    told = [*settings.reading, *(["yaw"] if bare and settings.yaw != "auto" else [])]
     if path.is_dir() and told:
         raise InputError(f"{path}: expected a model file beside {', '.join(told)}, found a folder")
-    if path.is_dir() and not (path / "manifest.json").exists():
+    if bare:
         return None, path
     from ...data.readers import read
 

@@ -80,7 +80,8 @@ def check(
         return check_map(Path(model), _sources(pvs), cells, rays=rays, seed=seed, targets=targets, progress=progress)
     if pvs is None:
         raise InputError(f"{model}: expected claims beside it, found none")
-    if isinstance(model, str | Path) and Path(model).is_file() and (yaw_deg := _baked_yaw(cells)):
+    # Cells of a bake lie in its frame.
+    if (yaw_deg := _baked_yaw(cells)) and not _is_bake(model):
         reading.setdefault("yaw", yaw_deg)
     opened = open_model(model, reading)
     if isinstance(opened, CellGraph):
@@ -157,9 +158,13 @@ def open_model(model: Scene | str | Path, reading: dict[str, object]) -> tuple[S
         InputError: it is unreadable.
     """
     if isinstance(model, Scene):
-        return model, None
+        from ...data.frame import in_frame
+
+        return in_frame(model, reading.get("yaw", 0.0)), None
     path = Path(model)
+    scene_folder = (path / "manifest.json").is_file() and not _is_bake(path)
     told = [name for name, value in reading.items() if value not in (None, "", "open")]
+    told = [name for name in told if not (name == "yaw" and scene_folder)]
     if path.is_dir() and told:
         raise InputError(f"{path}: expected a model file beside {', '.join(told)}, found a folder")
     if path.is_dir() and not (path / "manifest.json").exists():
@@ -174,6 +179,11 @@ def open_model(model: Scene | str | Path, reading: dict[str, object]) -> tuple[S
     from ...data.readers import read
 
     return read(path, **reading), None
+
+
+def _is_bake(model: Scene | str | Path) -> bool:
+    """Whether a model is a bake folder."""
+    return not isinstance(model, Scene) and Path(model).is_dir() and read_kind(Path(model)) == "bake"
 
 
 def read_kind(folder: Path) -> str:

@@ -62,12 +62,15 @@ def inspect(
 
 
 def _scene(model: Scene | str | Path, reading: "Mapping[str, object]") -> Scene:
+    # As a bake takes it.
+    reading = {"yaw": "auto"} | dict(reading)
     if isinstance(model, Scene):
-        return model
+        from ...data.frame import in_frame
+
+        return in_frame(model, reading["yaw"])
     from ...data.readers import read
 
-    # As a bake takes it.
-    return read(model, **({"yaw": "auto"} | dict(reading) if not Path(model).is_dir() else reading))
+    return read(model, **reading)
 
 
 def _unit_because(model: Scene | str | Path, reading: "Mapping[str, object]") -> str:

@@ -172,9 +172,9 @@ def model_name(bake: "BakeFolder") -> str:
     call = CALL.fullmatch(source)
     if call is None:
         return Path(source).name or Path(bake.folder).name
-    like, floors = re.search(r"like='([^']+)'", call[2]), re.search(r"floors=(\d+)", call[2])
-    size = f" like {like[1]}" if like else f", {floors[1]} floors" if floors else ""
-    return f"Synthetic {call[1]}{size}"
+    like = re.search(r"like='([^']+)'", call[2])
+    counts = [f", {count[2]} {count[1]}" for count in re.finditer(r"\b(floors|wings|sides|windows)=(\d+)", call[2])]
+    return f"Synthetic {call[1]}{f' like {like[1]}' if like else ''.join(counts)}"
 
 
 def _draw_set(bake: "BakeFolder", painter: Painter, storeys: list[Storey], cell: int, path: Path) -> tuple[str, str]:

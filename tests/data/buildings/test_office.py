@@ -1,8 +1,10 @@
+import hashlib
 from collections import Counter
 
 import numpy as np
 import pytest
 import trimesh
+from builders.closed import assert_closed
 from scipy.spatial import cKDTree
 from viewcell.data.buildings.furniture import FURNITURE
 from viewcell.data.buildings.glb import write_glb
@@ -11,7 +13,7 @@ from viewcell.data.buildings.shapes import Ball, Box, Cylinder, pierced_block
 from viewcell.data.buildings.statistics import LevelStatistic, level_statistics
 from viewcell.data.errors import InputError
 from viewcell.data.readers import read
-from viewcell.data.scene import Definition, Instance, Mesh, Role, Scene
+from viewcell.data.scene import Definition, Instance, Mesh, Role, Scene, turned
 from viewcell.data.store.scene_folder import read_scene, write_scene
 
 # Funkhouser et al. 1996, Table 1: objects and polygons of each level.
@@ -28,16 +30,6 @@ TABLE_1 = {
 @pytest.fixture(scope="module")
 def office() -> Scene:
     return make_office()
-
-
-def assert_closed(mesh: Mesh) -> None:
-    """Every edge has one face on each side, and the faces look outwards."""
-    edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    there = Counter(map(tuple, edges.tolist()))
-    assert set(there.values()) == {1}
-    assert all((b, a) in there for a, b in there)
-    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
-    assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0
 
 
 def test_default_size(office):
@@ -59,6 +51,33 @@ def test_same_arguments_same_scene(office):
         other.triangles()[0].shape != office.triangles()[0].shape
         or (other.triangles()[0] != office.triangles()[0]).any()
     )
+
+
+@pytest.mark.parametrize(
+    ("options", "digest"),
+    [
+        ({}, "b33718e16b688891175f413d0edf894d"),
+        ({"floors": 2, "rooms_per_side": 2, "seed": 3}, "8fb661f83b81f3a8855a29450059b616"),
+        ({"floors": 1, "rooms_per_side": 1, "furnished": False}, "cc40dbae444ed6ee18493826134ae360"),
+    ],
+)
+def test_offices_of_earlier_versions_are_made_again(options, digest):
+    """Published numbers are about them. Turned by 0 degrees and in one wing they are the same."""
+    scene = make_office(**options, yaw_deg=0.0, wings=1)
+    names = repr([placed.name for placed in scene.objects])
+    found = hashlib.sha256(scene.triangles()[0].tobytes() + names.encode()).hexdigest()
+    assert found.startswith(digest) and "yaw" not in scene.source
+
+
+@pytest.mark.parametrize("yaw_deg", [17.0, -30.0, 90.0])
+def test_a_turned_office_is_the_office_turned(yaw_deg):
+    plain, scene = (make_office(floors=1, rooms_per_side=1, yaw_deg=yaw) for yaw in (0.0, yaw_deg))
+    for number in range(0, len(plain.objects), 7):
+        found, stood = (model.world_vertices(number) * model.grid_m for model in (scene, plain))
+        np.testing.assert_allclose(found, turned(stood, yaw_deg), atol=2e-3)
+    for room, stood in zip(scene.spaces, plain.spaces, strict=True):
+        np.testing.assert_allclose(room.vertices, turned(stood.vertices, yaw_deg), atol=1e-12)
+    assert len(scene.openings) == len(plain.openings)
 
 
 @pytest.mark.parametrize(("floors", "rooms"), [(1, 1), (1, 5), (4, 2)])

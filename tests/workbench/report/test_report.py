@@ -134,6 +134,11 @@ def test_painter_cuts_what_the_section_meets(house):
     [
         ("make_office(floors=3, rooms_per_side=8, seed=0, furnished=True)", "Synthetic office, 3 floors"),
         ("make_office(like='soda-hall', seed=0)", "Synthetic office like soda-hall"),
+        (
+            "make_office(floors=1, seed=0, yaw_deg=17, wings=2, wing_angle_deg=30)",
+            "Synthetic office, 1 floors, 2 wings",
+        ),
+        ("make_rotunda(sides=6, seed=0, furnished=True)", "Synthetic rotunda, 6 sides"),
         ("some/folder/house.ifc", "house.ifc"),
         ("", "house"),
     ],
