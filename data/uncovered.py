@@ -12,7 +12,7 @@ COVERED_SHARE = 0.1
 
 
 def uncovered_rooms(scene: Scene, graph: CellGraph) -> list[str]:
-    """Names of the rooms of which inhabitable cells hold less than a tenth, in the model's order.
+    """Names of the rooms of which inhabitable cells hold less than a tenth of the sample points, in the model's order.
 
     Args:
         scene: whose spaces are the rooms.
