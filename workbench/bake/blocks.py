@@ -4,7 +4,7 @@ import hashlib
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -104,7 +104,7 @@ class Work:
     store: Store
     bar: tqdm
     deadline: float = np.inf
-    started: float = field(default_factory=time.perf_counter)
+    started: float = 0.0
 
     @property
     def late(self) -> bool:

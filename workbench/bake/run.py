@@ -238,8 +238,9 @@ def _visibility(
     cut = in_blocks(sources)
     total = sum(map(len, cut))
     with tqdm(total=total, unit="cell", desc="visibility", disable=not run.progress) as bar:
-        deadline = np.inf if run.budget_s is None else time.perf_counter() + run.budget_s
-        work = Work(engine, Store(partial_folder(run.out), run.known), bar, deadline)
+        started = time.perf_counter()
+        deadline = np.inf if run.budget_s is None else started + run.budget_s
+        work = Work(engine, Store(partial_folder(run.out), run.known), bar, deadline, started)
         parts, short = work.all_parts(cut)
         if sources.octree:
             parts, unrefined = refine(sources, work, parts, settings)
