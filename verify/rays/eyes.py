@@ -1,7 +1,7 @@
 """What random eyes in view cells see, against what the cells keep: what a culler of every frame could still gain.
 
 An eye sees an object where a ray aimed at it arrives, through transparent objects. Rays that are aimed at what a cell
-keeps find more than even ones: on the default office 8 rounds of them see what a million even rays an eye would not.
+keeps find more than even ones: on the default office 8 rounds, 1,139 rays an eye, see 10 % more than 65,536 even rays.
 """
 
 from dataclasses import dataclass
