@@ -12,7 +12,7 @@ from ...data.graph import CellGraph
 from ...data.kept import cell_volumes
 from ...data.scene import OPAQUE, Role, Scene
 from ...data.solids import SolidIndex
-from .embree import embree_scene
+from .embree import embree_scene, lattice_points
 
 # Cells measured at most, and eyes in each.
 CELLS_MOST, EYES = 32, 64
@@ -83,7 +83,7 @@ def kept_by_eye(
     """
     rng = np.random.default_rng(seed)
     cells, weights = _drawn_cells(graph, rng)
-    sight = _Sight(scene)
+    sight = Sight(scene)
     index = SolidIndex(graph.cells[cells], solids)
     source, target = pairs
     wanted = np.isin(source, cells)
@@ -93,14 +93,14 @@ def kept_by_eye(
     found, left = {}, RAYS_MOST
     # Small sets leave rays to large ones.
     for done, place in enumerate(np.argsort([len(own) for own in kept], kind="stable")):
-        eyes = _eyes(graph.cells[cells[place]], index, int(place), rng)
+        eyes = draw_eyes(graph.cells[cells[place]], index, int(place), EYES, rng)
         objects = rng.permutation(kept[place])[:OBJECTS_MOST]
         if not len(eyes) or not len(objects):
             continue
-        seen, spent = sight.seen(eyes, np.sort(objects), left // (len(kept) - done), rng)
+        marks, spent = sight.marks(eyes, np.sort(objects), left // (len(kept) - done), rng)
         left -= spent
         # No eye of a cell may see any of what it keeps: then all of it, to one object, is too much.
-        found[int(place)] = len(objects) / max(seen, 1.0)
+        found[int(place)] = len(objects) / max(float(marks.sum(axis=1).mean()), 1.0)
     if not found:
         return None
     places = np.array(sorted(found))
@@ -119,29 +119,59 @@ def _drawn_cells(graph: CellGraph, rng: np.random.Generator) -> tuple[np.ndarray
     return cells[places], times * ends[-1] / CELLS_MOST
 
 
-def _eyes(box: np.ndarray, index: SolidIndex, place: int, rng: np.random.Generator) -> np.ndarray:
-    """At most EYES random points of a box outside every solid, shape (n, 3), float32."""
-    share = rng.random((DRAWN * EYES, 3))
+def draw_eyes(box: np.ndarray, index: SolidIndex, place: int, count: int, rng: np.random.Generator) -> np.ndarray:
+    """At most so many random points of a box outside every solid [grid steps], shape (n, 3), float32.
+
+    Args:
+        box: shape (2, 3).
+        index: of the solids by cell.
+        place: of the cell in it that holds the box.
+        count: points wanted.
+        rng: source of randomness.
+    """
+    share = rng.random((DRAWN * count, 3))
     points = (box[0] + share * (box[1] - box[0])).astype(np.float32)
     inside = ((points > box[0]) & (points < box[1])).all(axis=1)
     points = points[inside]
-    return points[index.outside(points.astype(np.float64), place)][:EYES]
+    return points[index.outside(points.astype(np.float64), place)][:count]
 
 
-class _Sight:
-    """Rays through a model."""
+class Sight:
+    """Rays through a model, from eyes to objects."""
 
     def __init__(self, scene: Scene) -> None:
+        """Build Embree's scenes."""
         opaque, self._owners = scene.triangles(*OPAQUE)
-        self._opaque = embree_scene(opaque)
+        glass, self._glass_owners = scene.triangles(Role.TRANSPARENT)
+        self._opaque, self._glass = embree_scene(opaque), embree_scene(glass)
         self._corners, self._starts = scene.triangles()[0], scene.triangle_starts
         self._clear = scene.object_mask(Role.TRANSPARENT)
         edges = (self._corners[:, 1:] - self._corners[:, :1]).astype(np.float64)
         # A little more than nothing, so that every object has somewhere to be aimed at.
         self._areas = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.cross(*edges.swapaxes(0, 1)), axis=1) + 1.0)])
 
-    def seen(self, eyes: np.ndarray, objects: np.ndarray, rays: int, rng: np.random.Generator) -> tuple[float, int]:
-        """How many of the objects (ascending) an eye sees on average, and how many rays that took."""
+    def around(self, eyes: np.ndarray, count: int) -> np.ndarray:
+        """Ids, ascending, of the objects that so many even rays from each eye meet first, or through glass."""
+        # Every eye has directions of its own.
+        origins, along = np.repeat(eyes, count, axis=0), lattice_points(0, len(eyes) * count)
+        reach, found = np.full(len(along), 1e30, np.float32), []
+        if self._opaque is not None and len(along):
+            hits = self._opaque.run(origins, along, output=1)
+            hit = hits["primID"] >= 0
+            reach[hit] = hits["tfar"][hit]
+            found.append(self._owners[hits["primID"][hit]])
+        if self._glass is not None and len(along):
+            hits = self._glass.run(origins, along, dists=reach)
+            found.append(self._glass_owners[hits[hits >= 0]])
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
+
+    def marks(
+        self, eyes: np.ndarray, objects: np.ndarray, rays: int, rng: np.random.Generator
+    ) -> tuple[np.ndarray, int]:
+        """Which of the objects (ascending) each eye sees, shape (eyes, objects), bool, and how many rays that took.
+
+        No more rounds than the given number of rays allows, but at least three.
+        """
         marks = np.zeros((len(eyes), len(objects)), bool)
         # Where rays have met an object last: half of the rounds aim there, because other eyes may see that part, too.
         met = np.full((len(objects), 3), np.nan, np.float32)
@@ -158,7 +188,7 @@ class _Sight:
                 ends = np.where(np.isnan(met[aim]), ends, met[aim])
             self._shoot((eyes, eye), (objects, aim), ends, marks, met)
             spent += len(eye)
-        return float(marks.sum(axis=1).mean()), spent
+        return marks, spent
 
     def _points(self, objects: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """A random point on each object, by area [grid steps], shape (n, 3), float32."""

@@ -104,7 +104,7 @@ def _first_to_do(facts: dict, budget: bool, leak: bool) -> str:
         return "a smaller --cell-size or a larger --depth keeps less, if the model is not one open hall"
     return (
         f"{LOOK} shows whether doors were not told (--doors-by), cracks leak (--seal), walls stand off the axes "
-        "(--yaw) or rooms are missing; one open hall keeps what it shows"
+        "(--yaw) or rooms are missing; --refine-kept 1.5 halves long cells; one open hall keeps what it shows"
     )
 
 
