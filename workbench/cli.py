@@ -235,6 +235,13 @@ def _add_settings(group: argparse._ArgumentGroup) -> None:
         ("--depth", "depth", None, _whole(0, 12), "times an octree's cell is refined; 2 by default"),
         ("--refine-triangles", "refine_triangles", "N", _whole(1), "refine a cell that may see more"),
         ("--refine-gap", "refine_gap", "SHARE", _number, "refine a cell if more of its set than this is unknown"),
+        (
+            "--refine-kept",
+            "refine_kept",
+            "RATIO",
+            _number,
+            "halve cells whose eyes together see more than so many times as much as one; 1.5 halves long corridors",
+        ),
         ("--seed", "seed", None, _whole(0, SEED_LIMIT - 1), "of random sightlines; 0 by default"),
         ("--pixels", "pixels", "N", _number, "by how much a level may deviate on the image; 1 by default"),
         ("--image", "image", "WxH", str, "size of that image; 1920x1080 by default"),

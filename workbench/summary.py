@@ -6,7 +6,6 @@ if TYPE_CHECKING:
     from ..data.store.bake_folder import BakeFolder
 
 SKIPPED_SHOWN = 3
-LEAK_SHOWN = 12
 
 
 def summary(bake: "BakeFolder") -> str:
@@ -23,13 +22,11 @@ def summary(bake: "BakeFolder") -> str:
         lines.append(
             f"turned back by {facts['yaw_deg']:g} degrees, so that most walls stand along the axes (--yaw 0: not)"
         )
-    leak = facts.get("leak_cells") or []
-    if leak:
-        shown = ", ".join(str(cell) for cell in leak[:LEAK_SHOWN]) + (", ..." if len(leak) > LEAK_SHOWN else "")
-        lines.append(f"the outside leaks into the middle of the building, through cells {shown}")
     lines += [f"warning: {text}" for text in facts.get("warnings", [])]
     rows = [(c.name, *c.columns()) for c in count_pairs(bake)]
     lines += ["", table(("seen from inhabitable cells", "potential", "seen", "overestimate", "unknown"), rows), ""]
+    if facts.get("kept"):
+        lines += [*kept_lines(facts["kept"]), ""]
     if counts.get("potential_triangles"):
         share = 100.0 * counts["back_facing_triangles"] / counts["potential_triangles"]
         lines += [f"{share:.1f} % of the triangles in these sets face away from all of their cell", ""]
@@ -43,6 +40,30 @@ def summary(bake: "BakeFolder") -> str:
         lines += [_certificates(bake), ""]
     lines.append("seconds: " + ", ".join(f"{name} {value:.1f}" for name, value in facts["seconds"].items()))
     return "\n".join(lines + _skipped(facts.get("skipped", [])))
+
+
+def kept_lines(kept: dict) -> list[str]:
+    """What view cells keep, as the manifest has it, in a line or two."""
+    lines = [
+        f"kept by a view cell on average: {100 * kept['objects']:.1f} % of the objects, "
+        f"{100 * kept['triangles']:.1f} % of the triangles"
+    ]
+    if eye := kept["eye"]:
+        lines.append(
+            f"kept / eye: {eye['median']:.2f} in the median, {eye['worst']:.2f} at worst (cell {eye['worst_cell']}); "
+            f"{eye['eyes']} random eyes in each of {eye['cells']} cells"
+        )
+    return lines
+
+
+def kept_rows(kept: dict) -> list[tuple[str, str]]:
+    """The same as names and values."""
+    rows = [(f"{name}, mean by volume", f"{100 * kept[name]:.1f} %") for name in ("objects", "triangles")]
+    if eye := kept["eye"]:
+        rows += [("kept / eye, median", f"{eye['median']:.2f}")]
+        rows += [(f"kept / eye, worst (cell {eye['worst_cell']})", f"{eye['worst']:.2f}")]
+        rows += [("random eyes", f"{eye['eyes']} in each of {eye['cells']} cells")]
+    return rows
 
 
 def _certificates(bake: "BakeFolder") -> str:

@@ -19,6 +19,7 @@ import pyarrow.parquet as pq
 
 from ..errors import InputError
 from ..graph import OTHER_AXES, CellGraph
+from ..kept import kept_shares
 from ..rows import Rows
 from ..scene import Scene
 from ..verdict import Verdict
@@ -123,6 +124,16 @@ class BakeFolder:
     def potential_objects(self) -> np.ndarray:
         """Potentially visible objects, shape (cells, objects), bool; rows of inhabitable cells only."""
         return self._matrix(self.cell_to_object, "object_id", self.manifest["counts"]["objects"])
+
+    def kept(self) -> tuple[np.ndarray, np.ndarray]:
+        """Shares of the model's objects, and of its triangles at their finest, that each cell keeps.
+
+        Returns:
+            Two arrays of shape (cells,), float64, from 0 to 1; 0 where a cell is not inhabitable, and in a bare graph.
+        """
+        sizes = np.zeros(0, int) if self.scene is None else self.scene.triangle_counts
+        table = self.cell_to_object
+        return kept_shares(self.graph.cell_count, *(table[name].to_numpy() for name in CELL_TO_OBJECT[:2]), sizes)
 
     def potential(self, cell: int) -> np.ndarray:
         """Ids of the objects that may be visible from somewhere in a cell, ascending: its PVS.

@@ -76,16 +76,20 @@ def test_verify_exits_1_on_a_wrong_hidden_and_replays_it(copy, baked, capsys):
     assert capsys.readouterr().out.startswith("fixed: cell 0, cell 2")
 
 
-def test_summary_says_what_leaks_and_what_was_skipped(copy, capsys):
+def test_summary_says_what_is_kept_warned_of_and_skipped(copy, capsys):
     manifest = json.loads((copy / "manifest.json").read_text())
     parts = [{"what": f"wall {n}", "why": "no\nfaces"} for n in range(5)]
-    manifest |= {"leak_cells": [3, 1, 2], "skipped": parts, "inhabitable_because": "inside the model's 9 rooms"}
+    manifest |= {"warnings": ["it leaks"], "skipped": parts, "inhabitable_because": "inside the model's 9 rooms"}
+    eye = {"median": 2.5, "worst": 12.25, "worst_cell": 3, "cells": 4, "eyes": 64}
+    manifest |= {"kept": {"objects": 0.125, "triangles": 0.5, "eye": eye}}
     (copy / "manifest.json").write_text(json.dumps(manifest))
     from viewcell.workbench.summary import summary
 
     lines = summary(viewcell.load(copy)).splitlines()
     assert lines[0] == "4 cells, 4 inhabitable (inside the model's 9 rooms)"
-    assert "the outside leaks into the middle of the building, through cells 3, 1, 2" in lines
+    assert "warning: it leaks" in lines
+    assert "kept by a view cell on average: 12.5 % of the objects, 50.0 % of the triangles" in lines
+    assert "kept / eye: 2.50 in the median, 12.25 at worst (cell 3); 64 random eyes in each of 4 cells" in lines
     assert lines[-5:-3] == ["skipped 5:", "  wall 0: no faces"] and lines[-1].startswith("  ...")
 
 

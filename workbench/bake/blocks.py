@@ -3,6 +3,7 @@
 import hashlib
 import shutil
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 BLOCK = 24
 # View cells per block: their sets are larger.
 VIEW_BLOCK = 8
+# Looking for witnesses takes so many times as long as telling what is hidden, where it was not measured.
+GUESSED = 2.0
 
 
 def partial_folder(out: Path) -> Path:
@@ -68,6 +71,23 @@ class Store:
             raise InputError(f"{self._folder}: expected room for unfinished work, found: {error.strerror}") from None
 
 
+@dataclass(frozen=True)
+class Shortfall:
+    """What a deadline left undone.
+
+    Attributes:
+        phase: what was being done: "hiding", "witnesses" or "octree".
+        cells: view cells that are not finished.
+        pairs: pairs without a verdict from them: unknown, never hidden.
+        needed_s: about how long visibility takes as a whole, from what was measured; None if nothing was.
+    """
+
+    phase: str
+    cells: int
+    pairs: int
+    needed_s: float | None
+
+
 @dataclass
 class Work:
     """Blocks of a bake, on the way.
@@ -77,12 +97,14 @@ class Work:
         store: of finished ones.
         bar: of progress, in cells.
         deadline: when no more is begun, of `time.perf_counter`.
+        started: when it began, likewise.
     """
 
     engine: "Engine"
     store: Store
     bar: tqdm
     deadline: float = np.inf
+    started: float = 0.0
 
     @property
     def late(self) -> bool:
@@ -98,25 +120,61 @@ class Work:
         self.bar.update(len(block))
         return part
 
-    def all_parts(self, blocks: list[np.ndarray]) -> "tuple[list[Part], bool]":
-        """All blocks, and whether the deadline ended them early: what is left is unknown, never hidden."""
+    def all_parts(self, blocks: list[np.ndarray]) -> "tuple[list[Part], Shortfall | None]":
+        """All blocks, and what the deadline left of them, if it ended them early: that is unknown, never hidden."""
         if np.isinf(self.deadline):
-            return [self.finish(number, block) for number, block in enumerate(blocks)], False
+            return [self.finish(number, block) for number, block in enumerate(blocks)], None
         # First what is hidden from each, then witnesses where most is unknown.
-        parts, rough = [], []
+        parts, rough, raw = [], [], []
+        first, full = _Rate(), _Rate()
         for number, block in enumerate(blocks):
             part = self.store.load(number)
-            if part is None:
-                rough.append(number)
-                part = self.engine.unknown(block) if self.late else self.engine.visible(block, aim=False)
-            else:
+            if part is not None:
                 self.bar.update(len(block))
+            elif self.late:
+                raw.append(number)
+                part = self.engine.unknown(block)
+            else:
+                rough.append(number)
+                part = first.take(len(block), lambda block=block: self.engine.visible(block, aim=False))
             parts.append(part)
         rough.sort(key=lambda number: -parts[number].unknown_count)
         while rough and not self.late:
             number = rough.pop(0)
-            parts[number] = self.finish(number, blocks[number])
-        return parts, bool(rough)
+            block = blocks[number]
+            parts[number] = full.take(len(block), lambda number=number, block=block: self.finish(number, block))
+        left = raw + rough
+        if not left:
+            return parts, None
+        counts = [sum(len(blocks[number]) for number in numbers) for numbers in (raw, left)]
+        needed = None
+        if first.cells:
+            # Witnesses take as long again where none were looked for yet, or several times so.
+            each = full.each if full.cells else GUESSED * first.each
+            needed = time.perf_counter() - self.started + counts[0] * first.each + counts[1] * each
+        pairs = sum(parts[number].unknown_count for number in left)
+        return parts, Shortfall("hiding" if raw else "witnesses", counts[1], pairs, needed)
+
+
+@dataclass
+class _Rate:
+    """How long view cells take: how many were done, in how many seconds."""
+
+    cells: int = 0
+    seconds: float = 0.0
+
+    @property
+    def each(self) -> float:
+        """Seconds per view cell."""
+        return self.seconds / self.cells
+
+    def take(self, cells: int, do: "Callable[[], Part]") -> "Part":
+        """What `do` returns, timed."""
+        start = time.perf_counter()
+        part = do()
+        self.cells += cells
+        self.seconds += time.perf_counter() - start
+        return part
 
 
 def in_blocks(sources: Sources) -> list[np.ndarray]:
@@ -126,15 +184,17 @@ def in_blocks(sources: Sources) -> list[np.ndarray]:
     return [cells[i : i + size] for i in range(0, len(cells), size)]
 
 
-def refine(sources: Sources, work: Work, parts: "list[Part]", settings: CellSettings) -> "tuple[list[Part], bool]":
+def refine(
+    sources: Sources, work: Work, parts: "list[Part]", settings: CellSettings
+) -> "tuple[list[Part], Shortfall | None]":
     """Replace cells of an octree that may see too much, or know too little, by their octants, level by level.
 
     Returns:
-        Parts of the cells that are left, which `sources` has then; and whether the deadline ended it early.
+        Parts of the cells that are left, which `sources` has then; and what the deadline left of a level, if anything.
     """
     model, engine = sources.model, work.engine
     sizes, cells = model.scene.triangle_counts, sources.graph.cells
-    kept, leaves, spent = [], [], False
+    kept, leaves, short = [], [], None
     for level in range(1, settings.depth + 2):
         coarse = np.zeros(len(cells), bool)
         if level <= settings.depth:
@@ -144,21 +204,22 @@ def refine(sources: Sources, work: Work, parts: "list[Part]", settings: CellSett
         alive = walkable(families.reshape(-1, 2, 3), model).reshape(-1, 8)
         parents = np.flatnonzero(coarse)
         work.engine = engine.from_cells(families[alive].astype(np.int32))
-        fresh, count = [], 0
+        fresh, count, rate = [], 0, _Rate()
         work.bar.total += int(alive.sum())
         work.bar.refresh()
         for number, size in enumerate(alive.sum(axis=1)):
             if work.late:
                 # What is left of this level stays as it is: unrefined, never hidden.
                 coarse[parents[number:]] = False
-                spent = True
+                short = _unrefined(work, parts, parents[number:], rate)
                 break
             block = np.arange(count, count + size)
             count += int(size)
             if size:
                 # Which cells come to be refined may depend on the budget: a block is known by its cells, too.
                 held = hashlib.sha256(work.engine.model.cells[block].tobytes()).hexdigest()[:16]
-                fresh.append(work.finish(f"{level}-{block[0]}-{held}", block))
+                name = f"{level}-{block[0]}-{held}"
+                fresh.append(rate.take(1, lambda name=name, block=block: work.finish(name, block)))
         place = np.cumsum(~coarse) - 1 + sum(map(len, leaves))
         kept += [part.relabelled(np.where(coarse, -1, place)) for part in parts]
         leaves.append(cells[~coarse])
@@ -166,7 +227,14 @@ def refine(sources: Sources, work: Work, parts: "list[Part]", settings: CellSett
         if not count:
             break
     sources.graph = as_graph(np.concatenate(leaves))
-    return kept, spent
+    return kept, short
+
+
+def _unrefined(work: Work, parts: "list[Part]", parents: np.ndarray, rate: _Rate) -> Shortfall:
+    """What is left of a level, from the cells that should have been refined and the rate of those that were."""
+    pairs = sum(int((~part.objects.seen & np.isin(part.objects.source, parents)).sum()) for part in parts)
+    needed = time.perf_counter() - work.started + len(parents) * rate.each if rate.cells else None
+    return Shortfall("octree", len(parents), pairs, needed)
 
 
 def _too_coarse(part: "Part", count: int, sizes: np.ndarray, settings: CellSettings) -> np.ndarray:

@@ -19,6 +19,7 @@ from ...data.store.scene_folder import scene_manifest
 from ...data.store.view_cells import read_view_cells
 from ...data.subdivide import cut_rooms, merge, subdivide
 from ...data.view_cells import as_graph, octree_roots, walkable
+from .halve import halved
 from .manifest import Clock
 from .settings import Settings
 
@@ -63,6 +64,8 @@ def bare_sources(folder: Path, settings: Settings, clock: Clock) -> Sources:
     """
     if settings.seal:
         raise InputError(f"{folder}: expected a model to seal, found a bare graph")
+    if settings.refine_kept:
+        raise InputError(f"{folder}: expected a model whose cells to halve, found a bare graph")
     if settings.split or settings.lods:
         raise InputError(f"{folder}: expected a model to split or to simplify, found a bare graph")
     if settings.method in ("occluders", "both", "vlod") or settings.cells not in ("", "portals"):
@@ -93,6 +96,9 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
         raise InputError("cells: expected octree or a table for the method vlod, found portals")
     if cells == "portals":
         graph, notes = build_graph(model, settings, clock)
+        if settings.refine_kept:
+            graph, notes = _halved_graph(model, graph, notes, settings)
+            clock.lap("halve")
         if not settings.seal:
             return Sources(model, graph, facts | notes, False, method)
         cracks = crack_portals(graph, settings.seal / scene.grid_m)
@@ -101,6 +107,8 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
         return Sources(model, graph, facts | notes, False, method, closed=closed)
     if settings.seal:
         raise InputError("seal: expected a model that is cut into portal cells, found one too large; --cells portals")
+    if settings.refine_kept:
+        raise InputError(f"refine-kept: expected portal cells, found {cells}; --refine-gap refines an octree")
     if method == "auto":
         method = "occluders"
     # With certificates nothing is hidden by portals alone: the model is what a proof is checked against.
@@ -115,6 +123,16 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
         _check_inside(graph, portal_graph, method)
     clock.lap("view cells")
     return Sources(model, graph, facts | {"inhabitable_because": because}, True, method, portal_graph)
+
+
+def _halved_graph(model: PreparedModel, graph: CellGraph, notes: dict, settings: Settings) -> tuple[CellGraph, dict]:
+    """The graph with its cells halved where they keep much; halves are inhabitable, and called, as their cell."""
+    boxes, parents = halved(model, graph.cells, graph.inhabitable, settings.refine_kept, settings.seed)
+    if len(boxes) == graph.cell_count:
+        return graph, notes
+    made = find_portals(boxes, model.planes)
+    made.inhabitable, made.cell_names = graph.inhabitable[parents], graph.cell_names[parents]
+    return made, notes | {"leak_cells": np.searchsorted(parents, notes["leak_cells"]).tolist()}
 
 
 def _check_inside(graph: CellGraph, portal_graph: CellGraph, method: str) -> None:

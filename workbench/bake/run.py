@@ -2,7 +2,7 @@
 
 import shutil
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,10 +22,11 @@ from ...data.store.scene_folder import replaceable
 from ...solvers.levels.pixel_error import pixel_levels
 from ..baked import Bake
 from . import blocks
-from .blocks import Store, Work, in_blocks, partial_folder, refine
+from .blocks import Shortfall, Store, Work, in_blocks, partial_folder, refine
 from .cells import Sources, bare_sources, model_sources
 from .manifest import Clock, bake_manifest, fingerprint, finished_manifest, rewrite_manifest
 from .settings import LevelSettings, Settings, check_number
+from .worth import worth
 
 if TYPE_CHECKING:
     from ...kernels.launch import Device
@@ -159,16 +160,21 @@ def _detailed(scene: Scene, settings: Settings, run: _Run) -> tuple[Scene, dict]
 
 def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dict]) -> Bake:
     """Compute visibility, and all that follows from it, and write the folder."""
-    cell_rows, object_rows, extra, spent = _visibility(sources, settings, run)
+    cell_rows, object_rows, extra, short = _visibility(sources, settings, run)
     graph, facts, clock = sources.graph, sources.facts, run.clock
-    facts |= {"budget_spent": spent, **tuned}
+    facts |= {"budget_spent": short is not None, **tuned}
+    if short is not None:
+        facts["budget"] = {"budget_s": run.budget_s, **asdict(short)}
     scene = None if sources.model is None else sources.model.scene
     if sources.closed is not None:
         extra |= _leaks(sources, (cell_rows, object_rows), settings, run)
         clock.lap("leaks")
-    if sources.model is not None and not spent:
+    if sources.model is not None and short is None:
         facts["counts"] = facts["counts"] | _triangle_counts(sources.model, graph, object_rows, run.device)
         clock.lap("back faces")
+    pairs = object_rows.source, object_rows.target
+    facts |= worth(sources.model, graph, pairs, facts, settings.seed)
+    clock.lap("eyes")
     if scene is not None and settings.lods:
         extra["cell_lods"] = _cell_lods(scene, graph, object_rows, settings)
         clock.lap("levels of detail")
@@ -177,7 +183,7 @@ def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dic
         return bake_manifest(facts, settings, run.known, graph, (cell_rows, object_rows), clock)
 
     written = write_bake(run.out, manifest, scene, graph, (cell_rows, object_rows), facts["grid_m"], extra)
-    if not spent:
+    if short is None:
         shutil.rmtree(partial_folder(run.out), ignore_errors=True)
     return Bake(run.out, written)
 
@@ -220,8 +226,10 @@ def _engine(sources: Sources, settings: Settings, device: "Device") -> "Engine":
     return PortalEngine(sources.model, sources.graph, method=sources.method, **options)
 
 
-def _visibility(sources: Sources, settings: Settings, run: _Run) -> tuple[Rows | None, Rows, dict[str, pa.Table], bool]:
-    """Visibility of all inhabitable cells, certificate tables, and whether the budget ended it early.
+def _visibility(
+    sources: Sources, settings: Settings, run: _Run
+) -> tuple[Rows | None, Rows, dict[str, pa.Table], Shortfall | None]:
+    """Visibility of all inhabitable cells, certificate tables, and what the budget left of it, if it ended early.
 
     Cells of an octree are refined on the way: `sources` has them all then.
     """
@@ -233,12 +241,13 @@ def _visibility(sources: Sources, settings: Settings, run: _Run) -> tuple[Rows |
     cut = in_blocks(sources)
     total = sum(map(len, cut))
     with tqdm(total=total, unit="cell", desc="visibility", disable=not run.progress) as bar:
-        deadline = np.inf if run.budget_s is None else time.perf_counter() + run.budget_s
-        work = Work(engine, Store(partial_folder(run.out), run.known), bar, deadline)
-        parts, spent = work.all_parts(cut)
+        started = time.perf_counter()
+        deadline = np.inf if run.budget_s is None else started + run.budget_s
+        work = Work(engine, Store(partial_folder(run.out), run.known), bar, deadline, started)
+        parts, short = work.all_parts(cut)
         if sources.octree:
             parts, unrefined = refine(sources, work, parts, settings)
-            spent |= unrefined
+            short = short or unrefined
     clock.lap("flood")
     tables = {}
     if settings.certify:
@@ -247,7 +256,7 @@ def _visibility(sources: Sources, settings: Settings, run: _Run) -> tuple[Rows |
         sources.facts["counts"] = sources.facts["counts"] | {"proofs": len(proofs.cell)}
         sources.facts["certificate_s"] = round(proofs.seconds, 3)
         clock.lap("certificates")
-    return *engine.join(parts), tables, spent
+    return *engine.join(parts), tables, short
 
 
 def _triangle_counts(model: PreparedModel, graph: CellGraph, rows: Rows, device: "Device") -> dict[str, int]:

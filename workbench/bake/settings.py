@@ -59,6 +59,8 @@ class CellSettings:
         depth: times that a cell of the octree may be refined.
         refine_triangles: a cell that may see more triangles is refined.
         refine_gap: a cell is refined if a larger share of what it may see is unknown.
+        refine_kept: cells of portals are halved, before they are baked, where eyes in them see together more than so
+            many times as much as one of them does; 0 halves none.
     """
 
     cells: str = ""
@@ -67,6 +69,7 @@ class CellSettings:
     depth: int = 2
     refine_triangles: int = 100_000
     refine_gap: float = 0.25
+    refine_kept: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -161,6 +164,9 @@ class Settings(LevelSettings, MethodSettings, CellSettings, ModelSettings):
             raise InputError(f"depth: expected a whole number from 0 to {DEEPEST}, found {self.depth}")
         if self.frame.get("yaw") not in (None, "auto", 0.0) and self.cells not in ("", "portals", "octree"):
             raise InputError(f"yaw: expected auto or 0 beside a table of view cells, found {self.yaw}")
+        check_number("refine-kept", self.refine_kept, 0.0)
+        if 0.0 < self.refine_kept < 1.0:
+            raise InputError(f"refine-kept: expected 0 or a ratio from 1, found {self.refine_kept:g}")
         _ = self.pixel_limit, self.vlod
 
 

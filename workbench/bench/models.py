@@ -33,6 +33,8 @@ HEAD = (
     "cells, all",
     "objects",
     "unknown %: cells, inhabitable / all / objects",
+    "kept %: objects / triangles",
+    "kept / eye: median / worst",
     "undecided % of all pairs of cells",
     "rays",
     "wrong hidden",
@@ -60,6 +62,15 @@ def together(counts: list[Counts]) -> Counts:
     return Counts("all", sum(c.potential for c in counts), sum(c.seen for c in counts), sum(c.by_rays for c in counts))
 
 
+def _kept(kept: dict | None) -> list[str]:
+    """What view cells keep, in two columns."""
+    if kept is None:
+        return ["-", "-"]
+    eye = kept["eye"]
+    shares = " / ".join(f"{100 * kept[name]:.1f}" for name in ("objects", "triangles"))
+    return [shares, "-" if eye is None else f"{eye['median']:.2f} / {eye['worst']:.2f}"]
+
+
 def columns(name: str, made: BakeFolder, result: VerifyResult) -> list[object]:
     """One row of the table."""
     facts, objects = made.manifest, result.counts[-1]
@@ -72,6 +83,7 @@ def columns(name: str, made: BakeFolder, result: VerifyResult) -> list[object]:
         ", ".join(f"{phase} {seconds:.1f}" for phase, seconds in facts["seconds"].items()),
         *(c.columns()[2] for c in classes),
         " / ".join(f"{c.unknown_percent:.2f}" for c in classes),
+        *_kept(facts.get("kept")),
         f"{undecided_percent(made):.4f}",
         result.rays,
         result.wrong_hidden,

@@ -13,7 +13,9 @@ from ...data.prepared import PreparedModel
 from ...data.scene import OPAQUE
 from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses, visible_rows
+from ..bake.worth import told_worth
 from ..curves.series import read_curves
+from ..summary import kept_rows
 from .plans import Painter, Section, Storey, find_storeys, plan_of
 from .web_page import page
 
@@ -63,11 +65,12 @@ def report(
     if curves is None and (folder / "curves.json").exists():
         curves = folder / "curves.json"
     drawn = None if curves is None else read_curves(curves)
+    told = told_worth(bake)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
-            _write(bake, chosen, Path(scratch))
-            (Path(scratch) / "report.html").write_text(page(bake, model_name(bake), drawn), encoding="utf-8")
+            _write(bake, chosen, told, Path(scratch))
+            (Path(scratch) / "report.html").write_text(page(bake, model_name(bake), drawn, told), encoding="utf-8")
             for made in sorted(Path(scratch).iterdir()):
                 shutil.move(made, folder / made.name)
     except OSError as error:
@@ -107,10 +110,14 @@ def _potential(bake: "BakeFolder") -> np.ndarray:
     return bake.potential_cells if bake.claims_cells else bake.potential_objects
 
 
-def _write(bake: "BakeFolder", chosen: dict[int, str], folder: Path) -> None:
+def _write(bake: "BakeFolder", chosen: dict[int, str], told: tuple[dict | None, list[str]], folder: Path) -> None:
     painter = Painter(bake.graph, bake.scene, bake.grid_m, whole=not bake.claims_cells)
     name = model_name(bake)
-    lines = [f"# {name}", "", *_numbers(bake), ""]
+    lines = [f"# {name}", ""]
+    kept, warnings = told
+    for text in warnings:
+        lines += [f"> **Warning:** {text}.", ""]
+    lines += [*_numbers(bake, kept), ""]
     storeys = find_storeys(bake.graph, bake.grid_m) if bake.claims_cells else []
     lines += ["## Storeys", ""] if storeys else []
     for number, storey in enumerate(storeys):
@@ -256,8 +263,8 @@ def _describe(bake: "BakeFolder", kind: str, target: int) -> str:
     return f"object {target} | {placed.kind} ({placed.role.value}) | {name}"
 
 
-def _numbers(bake: "BakeFolder") -> list[str]:
-    """Tables of counts, overestimates and seconds."""
+def _numbers(bake: "BakeFolder", kept: dict | None) -> list[str]:
+    """Tables of counts, overestimates, what is kept, and seconds."""
     triangles = 0
     if bake.scene is not None:
         triangles = len(bake.scene.triangles(*OPAQUE)[0])
@@ -273,6 +280,8 @@ def _numbers(bake: "BakeFolder") -> list[str]:
     ]
     for c in count_pairs(bake):
         lines.append(f"| {c.name} | {' | '.join(c.columns())} |")
+    if kept is not None:
+        lines += ["", "| kept | |", "|---|---|", *(f"| {name} | {value} |" for name, value in kept_rows(kept))]
     seconds = {k: v for k, v in bake.manifest.get("seconds", {}).items() if isinstance(v, int | float)}
     if seconds:
         lines += ["", "| phase | seconds |", "|---|---|", *(f"| {k} | {v:.2f} |" for k, v in seconds.items())]

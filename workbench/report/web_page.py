@@ -20,6 +20,8 @@ from ... import __version__
 from ...data.scene import Role
 from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses
+from ..bake.worth import told_worth
+from ..summary import kept_rows
 from .modules import join_modules
 from .plans import Storey, find_storeys, plan_of, section_lines
 
@@ -58,25 +60,36 @@ class Rows(NamedTuple):
     portals: np.ndarray
 
 
-def page(bake: "BakeFolder", title: str, curves: "Curves | None" = None) -> str:
+def page(
+    bake: "BakeFolder",
+    title: str,
+    curves: "Curves | None" = None,
+    told: tuple[dict | None, list[str]] | None = None,
+) -> str:
     """The page, complete in itself.
 
     Args:
         bake: of a model with portals, of a bare cell graph, or of view cells that see objects only.
         title: the model's name.
         curves: of time against error, if there are any.
+        told: as from `told_worth`, if it is known already.
     """
     folder = files(__package__) / "page"
     parts = {"title": html.escape(title), "script": join_modules(folder, "main.mjs")}
     parts["style"] = (folder / "report.css").read_text("utf-8")
-    data = json.dumps(page_data(bake, title, curves), separators=(",", ":"), allow_nan=False)
+    data = json.dumps(page_data(bake, title, curves, told), separators=(",", ":"), allow_nan=False)
     # In a script element only "<" could end or open anything.
     parts["data"] = data.replace("<", "\\u003c")
     return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], (folder / "report.html").read_text("utf-8"))
 
 
-def page_data(bake: "BakeFolder", title: str, curves: "Curves | None" = None) -> dict:
-    """What the page shows, as JSON; arrays as `pack` makes them, coordinates in grid steps."""
+def page_data(
+    bake: "BakeFolder",
+    title: str,
+    curves: "Curves | None" = None,
+    told: tuple[dict | None, list[str]] | None = None,
+) -> dict:
+    """What the page shows, as JSON; arrays as `pack` makes them, coordinates in grid steps. Arguments as for `page`."""
     graph = bake.graph
     storeys = find_storeys(graph, bake.grid_m)
     of_cell = np.full(graph.cell_count, -1)
@@ -84,7 +97,7 @@ def page_data(bake: "BakeFolder", title: str, curves: "Curves | None" = None) ->
         of_cell[storey.cells] = number
     return {
         "title": title,
-        "facts": _facts(bake),
+        "facts": _facts(bake, told_worth(bake) if told is None else told),
         "cells": {
             "boxes": pack(graph.cells),
             "inhabitable": pack(graph.inhabitable.astype(np.uint8)),
@@ -122,9 +135,10 @@ def _zipped(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, mtime=0)).decode()
 
 
-def _facts(bake: "BakeFolder") -> dict:
+def _facts(bake: "BakeFolder", told: tuple[dict | None, list[str]]) -> dict:
     """Numbers and words of the manifest."""
     found, skipped = bake.manifest, bake.manifest.get("skipped", [])
+    kept, warnings = told
     return {
         "version": str(found.get("viewcell", __version__)),
         "source": str(found.get("source", "")),
@@ -139,9 +153,8 @@ def _facts(bake: "BakeFolder") -> dict:
         "settings": {k: _word(v) for k, v in found.get("settings", {}).items()},
         "skipped": [{"what": str(one.get("what")), "why": str(one.get("why"))} for one in skipped[:SKIPPED_MOST]],
         "skippedCount": len(skipped),
-        "leakCells": [int(cell) for cell in found.get("leak_cells") or []],
-        "warnings": [str(text) for text in found.get("warnings", [])],
-        "budgetSpent": bool(found.get("budget_spent", False)),
+        "warnings": warnings,
+        "kept": [] if kept is None else [list(row) for row in kept_rows(kept)],
         "classes": [[c.name, *c.columns()] for c in count_pairs(bake)],
     }
 

@@ -1,6 +1,7 @@
 """The bake folder: columns as published, the same after reading, contradictions told in one line."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow as pa
@@ -75,6 +76,17 @@ def test_what_was_written_is_read(tmp_path):
     # Exact: origin and origin + direction in grid steps are the points that were checked.
     np.testing.assert_array_equal(witness[[0, 2], :3] / GRID_M, rows.origin[[0, 2]])
     np.testing.assert_array_equal((witness[:, :3] + witness[:, 3:])[[0, 2]] / GRID_M, rows.end[[0, 2]])
+
+
+def test_kept_shares_of_cells(tmp_path):
+    """Cell 0 keeps two of the objects and cell 2 one; shares of triangles are of all triangles."""
+    bake, scene, _ = made(tmp_path / "house")
+    count = len(scene.objects)
+    sizes = np.arange(count)
+    bake.scene = SimpleNamespace(triangle_counts=sizes)
+    objects, triangles = bake.kept()
+    assert objects.tolist() == [2 / count, 0, 1 / count, 0, 0, 0, 0]
+    assert triangles.tolist() == [(sizes[3] + sizes[1]) / sizes.sum(), 0, sizes[17] / sizes.sum(), 0, 0, 0, 0]
 
 
 def test_potential_and_seen(tmp_path):

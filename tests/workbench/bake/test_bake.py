@@ -246,9 +246,9 @@ def test_a_bake_of_another_model_is_not_kept(part, asked_again):
 
 OTHER = {
     "threshold_m2": 0.5, "seed": 1, "doors": "closed", "method": "both", "cells": "octree", "cell_size_m": 2.0,
-    "depth": 1, "refine_triangles": 7, "refine_gap": 0.5, "certify": True, "clusters": 6, "objective": "centre",
-    "resolution": 64, "split": True, "lods": True, "pixels": 2.0, "image": "64x64", "fov_deg": 70.0,
-    "seal": 0.01, "yaw": "17", "glass": "pane", "doors_by": "gate", "leave_out": "tree",
+    "depth": 1, "refine_triangles": 7, "refine_gap": 0.5, "refine_kept": 2.0, "certify": True, "clusters": 6,
+    "objective": "centre", "resolution": 64, "split": True, "lods": True, "pixels": 2.0, "image": "64x64",
+    "fov_deg": 70.0, "seal": 0.01, "yaw": "17", "glass": "pane", "doors_by": "gate", "leave_out": "tree",
 }  # fmt: skip
 
 
@@ -293,6 +293,9 @@ def test_a_bake_of_view_cells_that_were_changed_is_not_kept(tmp_path):
         ({"settings": Settings(threshold_m2=-1.0)}, "threshold"),
         ({"settings": Settings(threshold_m2=float("inf"))}, "threshold"),
         ({"settings": Settings(seal=-0.1)}, "seal"),
+        ({"settings": Settings(refine_kept=-1.0)}, "refine-kept"),
+        ({"settings": Settings(refine_kept=0.5)}, "refine-kept"),
+        ({"settings": Settings(refine_kept=2.0, cells="octree")}, "refine-kept"),
     ],
 )
 def test_bad_arguments_are_one_line(options, message, office, tmp_path):

@@ -44,6 +44,23 @@ def test_report_of_the_house(house, tmp_path):
     assert sorted([*pictures, "report.html", "report.md"]) == sorted(p.name for p in path.parent.iterdir())
 
 
+def test_what_a_bake_is_worth_stands_in_both_reports(house, tmp_path):
+    """As the manifest says; a bake of an older version is measured."""
+    eye = {"median": 2.5, "worst": 12.25, "worst_cell": 3, "cells": 4, "eyes": 64}
+    house.manifest |= {"kept": {"objects": 0.625, "triangles": 0.5, "eye": eye}, "warnings": ["<it> leaks"]}
+    text = report(house, out=tmp_path / "told").read_text()
+    assert text.index("> **Warning:** <it> leaks.") < text.index("| model | |")
+    assert "| objects, mean by volume | 62.5 % |" in text and "| kept / eye, worst (cell 3) | 12.25 |" in text
+    page = (tmp_path / "told" / "report.html").read_text()
+    assert '"kept / eye, worst (cell 3)","12.25"' in page and "\\u003cit> leaks" in page
+    assert page.index('id="warnings"') < page.index('id="plan-section"')
+    del house.manifest["kept"]
+    shares = house.potential_objects[house.graph.inhabitable].mean(axis=1)
+    text = report(house, out=tmp_path / "found").read_text()
+    found = float(text.partition("| objects, mean by volume | ")[2].partition(" %")[0])
+    assert 100 * shares.min() - 0.1 < found < 100 * shares.max() + 0.1 and "> **Warning:** <it> leaks." in text
+
+
 def test_bare_graph_and_default_folder(tmp_path):
     path = report(small_house.small_house(tmp_path, bare=True), cells=[0])
     assert path == tmp_path / "house" / "report" / "report.md"

@@ -21,6 +21,12 @@ export function classesOf({ cells, facts, sources, cellCount, objectCount }) {
   return [...(facts.claimsCells ? ofCells : []), ...(objectCount ? ofObjects : [])];
 }
 
+/** How much of all objects the view cell keeps, in words; nothing in a bare graph. */
+export function keptWords({ objectCount, relations }, cell) {
+  if (!objectCount) return "";
+  return `; keeps ${((100 * relations.object.numbers(cell).potential) / objectCount).toFixed(1)} % of the objects`;
+}
+
 /** Name, whereabouts and numbers of the view cell. */
 export function showCell({ bake, cell }) {
   const b = bake.box("cell", cell),
@@ -28,7 +34,8 @@ export function showCell({ bake, cell }) {
   $("cell-input").value = label(cell, bake.cells.names[cell]);
   $("picker-error").hidden = true;
   $("cell-title").textContent = describe(bake, "cell", cell);
-  $("cell-facts").textContent = `${bake.level} ${bake.cells.storey[cell]}; ${size(bake, b)}; z ${low} to ${high} m`;
+  const where = `${bake.level} ${bake.cells.storey[cell]}; ${size(bake, b)}; z ${low} to ${high} m`;
+  $("cell-facts").textContent = where + keptWords(bake, cell);
   $("cell-numbers").tBodies[0].replaceChildren(
     ...classesOf(bake).flatMap(([name, kind, chosen, all]) => {
       const n = bake.relations[kind].numbers(cell, chosen);

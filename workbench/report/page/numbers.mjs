@@ -3,7 +3,6 @@ import { $, make, paragraph, tableCell, tableRow } from "./dom.mjs";
 import { count } from "./words.mjs";
 
 const DIGITS = /^[\d.,]+( %)?$/;
-const LEAKS_NAMED = 12;
 
 /** Tables of what the manifest says, each {title, rows, head}; a row is its name and one or more values. */
 export function factTables(facts) {
@@ -24,20 +23,11 @@ export function factTables(facts) {
       rows: facts.classes.map(([name, potential, seen, over, unknown]) => [name, potential, seen, unknown, over]),
       head: ["targets", "potential", "seen", "unknown", "overestimate"],
     },
+    ...(facts.kept.length ? [{ title: "Kept by a view cell", rows: facts.kept }] : []),
     { title: "Counts", rows: named(facts.counts, count) },
     ...(seconds.length > 1 ? [{ title: "Seconds by phase", rows: seconds }] : []),
     { title: "Settings", rows: named(facts.settings, (v) => v || "default") },
     { title: "Model", rows: model.filter(Boolean) },
-  ];
-}
-
-/** What the reader must know before the numbers. */
-export function warningsOf({ budgetSpent, leakCells, warnings }) {
-  const leaks = leakCells.slice(0, LEAKS_NAMED).join(", ") + (leakCells.length > LEAKS_NAMED ? ", ..." : "");
-  return [
-    ...(leakCells.length ? [`The outside leaks into the middle of the building, through cells ${leaks}.`] : []),
-    ...warnings,
-    ...(budgetSpent ? ["The time budget ended the bake early: what was left is unknown, never hidden."] : []),
   ];
 }
 
@@ -59,5 +49,6 @@ export function showNumbers(facts) {
     const table = factTable({ title: "", rows: skipped.map(({ what, why }) => [what, why]) });
     $("numbers").append(make("div", {}, make("details", {}, summary, table)));
   }
-  $("warnings").append(...warningsOf(facts).map((text) => paragraph("notice", `Warning: ${text}`)));
+  // What the reader must know first stands at the top of the page.
+  $("warnings").append(...facts.warnings.map((text) => paragraph("notice", `Warning: ${text}`)));
 }

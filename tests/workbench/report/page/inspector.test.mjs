@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import { classesOf, pathOf, reached } from "../../../../workbench/report/page/inspector.mjs";
+import { classesOf, keptWords, pathOf, reached } from "../../../../workbench/report/page/inspector.mjs";
 import { chosen } from "./two_storeys.mjs";
 
 test("classes of targets are counted apart", () => {
@@ -14,6 +14,14 @@ test("classes of targets are counted apart", () => {
   const names = (change) => classesOf({ ...bake, ...change }).map(([name]) => name);
   assert.deepEqual(names({ facts: { claimsCells: false } }), ["Objects"]);
   assert.deepEqual(names({ objectCount: 0 }), ["Inhabitable cells", "Other cells"]);
+});
+
+test("how much of the objects is kept", () => {
+  const { bake } = chosen();
+  const { potential } = bake.relations.object.numbers(0);
+  assert.ok(potential > 0 && potential < 4);
+  assert.equal(keptWords(bake, 0), `; keeps ${25 * potential}.0 % of the objects`);
+  assert.equal(keptWords({ ...bake, objectCount: 0 }, 0), "");
 });
 
 test("what is reached on each storey", () => {

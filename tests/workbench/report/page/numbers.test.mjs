@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import { factTables, warningsOf } from "../../../../workbench/report/page/numbers.mjs";
+import { factTables } from "../../../../workbench/report/page/numbers.mjs";
 
 const FACTS = {
   counts: { cell_pairs: 12345 },
@@ -13,15 +13,14 @@ const FACTS = {
   snapMetres: null,
   because: "",
   sha256: "",
-  budgetSpent: false,
-  leakCells: [],
-  warnings: ["w"],
+  kept: [["objects, mean by volume", "11.1 %"]],
 };
 
 test("the manifest's numbers are tables", () => {
   const tables = Object.fromEntries(factTables(FACTS).map(({ title, rows }) => [title, rows]));
   assert.deepEqual(tables, {
     "Seen from all view cells": [["objects", "9", "6", "3", "1.500"]],
+    "Kept by a view cell": [["objects, mean by volume", "11.1 %"]],
     Counts: [["cell pairs", "12,345"]],
     "Seconds by phase": [
       ["flood", "1.00"],
@@ -38,7 +37,7 @@ test("the manifest's numbers are tables", () => {
       ["origin", "(1, 2, 3) m"],
     ],
   });
-  const full = factTables({ ...FACTS, seconds: {}, snapMetres: 0.0005, because: "rooms", sha256: "ab" });
+  const full = factTables({ ...FACTS, kept: [], seconds: {}, snapMetres: 0.0005, because: "rooms", sha256: "ab" });
   assert.deepEqual(
     full.map(({ title }) => title),
     ["Seen from all view cells", "Counts", "Settings", "Model"],
@@ -48,14 +47,4 @@ test("the manifest's numbers are tables", () => {
     ["inhabitable cells", "rooms"],
     ["SHA-256", "ab"],
   ]);
-});
-
-test("leaks are warned of first, the budget last", () => {
-  assert.deepEqual(warningsOf(FACTS), ["w"]);
-  const leakCells = Array.from({ length: 13 }, (_, n) => n);
-  const [leak, own, budget] = warningsOf({ ...FACTS, leakCells, budgetSpent: true });
-  assert.match(leak, /through cells 0, 1, .*, 11, \.\.\.\.$/);
-  assert.equal(own, "w");
-  assert.match(budget, /budget/);
-  assert.match(warningsOf({ ...FACTS, leakCells: [4, 5] })[0], /through cells 4, 5\.$/);
 });
