@@ -28,8 +28,12 @@ def kept_shares(
 
 
 def cell_volumes(graph: CellGraph) -> np.ndarray:
-    """Volume of each cell [cubic grid steps], shape (cells,), float64."""
-    return np.prod((graph.cells[:, 1] - graph.cells[:, 0]).astype(np.float64), axis=1)
+    """Volume of each cell, or of its prism [cubic grid steps], shape (cells,), float64."""
+    size = (graph.cells[:, 1] - graph.cells[:, 0]).astype(np.float64)
+    volumes = size.prod(axis=1)
+    a, b = (np.diff(graph.plans.corners[:, ends].astype(np.float64), axis=1)[:, 0] for ends in ([0, 2], [1, 3]))
+    volumes[graph.plans.rows] = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2 * size[graph.plans.rows, 2]
+    return volumes
 
 
 def mean_kept(graph: CellGraph, shares: np.ndarray) -> float:

@@ -30,6 +30,11 @@ class Plans:
         rows = np.flatnonzero(place >= 0)
         return Plans(rows, self.corners[place[rows]])
 
+    def of(self, box: int) -> "Plans":
+        """The plan of one box, as of a list of that box alone."""
+        rows = self.rows == box
+        return Plans(np.zeros(int(rows.sum()), np.int64), self.corners[rows])
+
     def filled(self, count: int, chosen: np.ndarray) -> np.ndarray:
         """Corners for each of chosen boxes (indices) of a list of so many, all 0 for plain ones, (n, 4, 2), int32."""
         out = np.zeros((count, 4, 2), np.int32)

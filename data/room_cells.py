@@ -14,7 +14,7 @@ from .frame import wall_yaw
 from .graph import CellGraph
 from .plans import Plans
 from .scene import Scene, Space, turned
-from .solids import winding_numbers
+from .solids import SolidIndex, winding_numbers
 
 # Eyes are between these heights over a room's floor; what is higher need not be covered.
 LOWEST_EYE_M, HIGHEST_EYE_M = 0.1, 2.2
@@ -66,35 +66,55 @@ def room_name(space: Space) -> str:
     return space.name or "room"
 
 
-def add_room_cells(scene: Scene, graph: CellGraph) -> tuple[CellGraph, list[RoomCover]]:
+def add_room_cells(
+    scene: Scene, graph: CellGraph, solids: list[tuple[int, np.ndarray]]
+) -> tuple[CellGraph, list[RoomCover]]:
     """The graph with view cells for rooms that its own cells do not cover, and how all rooms are covered then.
 
     Args:
         scene: the model.
         graph: with inhabitable cells and their names.
+        solids: closed elements, in which nobody stands.
     """
-    covers, boxes, corners, names = [], [], [], []
-    for space in scene.spaces:
-        share = _covered_share(scene, space, graph)
+    covers, prisms, names = [], [], []
+    for space, points in zip(scene.spaces, _all_points(scene, solids), strict=True):
+        share = _covered_share(space, points, graph)
         made: list[tuple[np.ndarray, np.ndarray]] = []
-        if share < COVERED_SHARE:
+        if share < COVERED_SHARE and len(points):
             made = room_prisms(space, scene.grid_m)
             own = _with_cells(graph, made, [room_name(space)] * len(made))
-            share = _covered_share(scene, space, own) if made else share
-        why = "" if share >= COVERED_SHARE else _why(space, made)
-        covers.append(RoomCover(room_name(space), share, why))
-        for box, plan in made:
-            boxes.append(box)
-            corners.append(plan)
-            names.append(room_name(space))
-    return _with_cells(graph, list(zip(boxes, corners, strict=True)), names), covers
+            share = _covered_share(space, points, own)
+        covers.append(_cover(space, points, share))
+        prisms += made
+        names += [room_name(space)] * len(made)
+    return _with_cells(graph, prisms, names), covers
 
 
-def _why(space: Space, made: list) -> str:
+def room_covers(scene: Scene, graph: CellGraph, solids: list[tuple[int, np.ndarray]]) -> list[RoomCover]:
+    """How the rooms of a model are covered by the inhabitable cells of a graph that are named after them."""
+    points = zip(scene.spaces, _all_points(scene, solids), strict=True)
+    return [_cover(space, own, _covered_share(space, own, graph)) for space, own in points]
+
+
+def _cover(space: Space, points: np.ndarray, share: float) -> RoomCover:
+    if share >= COVERED_SHARE:
+        return RoomCover(room_name(space), share)
     extent = np.ptp(space.vertices, axis=0)
     if extent.min() < THINNEST_M:
-        return f"its body is {extent.min():.2f} m thin"
-    return "its outline is too fine for boxes" if made else "its body holds no point, or is not closed"
+        why = f"its body is {extent.min():.2f} m thin"
+    elif not len(eye_points(space)):
+        why = "its body is not closed"
+    else:
+        why = "its outline is too fine for boxes" if len(points) else "solids fill it"
+    return RoomCover(room_name(space), share, why)
+
+
+def _all_points(scene: Scene, solids: list[tuple[int, np.ndarray]]) -> list[np.ndarray]:
+    """`eye_points` of each room outside all solids [grid steps]."""
+    points = [eye_points(space) / scene.grid_m for space in scene.spaces]
+    around = [np.array([own.min(axis=0), own.max(axis=0)]) if len(own) else np.zeros((2, 3)) for own in points]
+    index = SolidIndex(np.array(around).reshape(-1, 2, 3), solids)
+    return [own[index.outside(own, room)] for room, own in enumerate(points)]
 
 
 def _with_cells(graph: CellGraph, prisms: list[tuple[np.ndarray, np.ndarray]], names: list[str]) -> CellGraph:
@@ -116,9 +136,8 @@ def _with_cells(graph: CellGraph, prisms: list[tuple[np.ndarray, np.ndarray]], n
     )
 
 
-def _covered_share(scene: Scene, space: Space, graph: CellGraph) -> float:
-    """Share of where eyes may be in a room that lies in inhabitable cells named after it."""
-    points = eye_points(space) / scene.grid_m
+def _covered_share(space: Space, points: np.ndarray, graph: CellGraph) -> float:
+    """Share of points of a room [grid steps] that lie in inhabitable cells named after it."""
     if not len(points):
         return 0.0
     name = room_name(space)

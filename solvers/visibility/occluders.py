@@ -239,7 +239,8 @@ def _prove_pieces_of(
     left[rows[answers.verdict == Verdict.HIDDEN]] = False
     lined = np.flatnonzero(answers.verdict == Verdict.VISIBLE)
     at = rows[lined]
-    hints[at] = np.stack(segments(answers, lined, model.cells[source[at]], boxes[at]), axis=1)
+    prisms = model.sights.plans.take(source[at], len(model.cells))
+    hints[at] = np.stack(segments(answers, lined, model.cells[source[at]], boxes[at], prisms), axis=1)
     # A line past all rectangles that meets no oblique occluder either: there is nothing to prove.
     # Shafts lead from box to box.
     at = rows[answers.verdict != Verdict.HIDDEN]

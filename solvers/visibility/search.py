@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...data.plans import NO_PLANS, Plans
 from ...data.verdict import Verdict
 from ...kernels.blockers import BlockerTree
 from ...kernels.launch import Device
@@ -26,15 +27,16 @@ def search_rounds(tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, device
 
 
 def segments(
-    answers: TargetAnswers, rows: np.ndarray, sources: np.ndarray, targets: np.ndarray
+    answers: TargetAnswers, rows: np.ndarray, sources: np.ndarray, targets: np.ndarray, plans: Plans = NO_PLANS
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the found lines: a quarter into the source box and a quarter into the target box, on the witness grid.
+    """Ends of the found lines: a quarter into the source and a quarter into the target box, on the witness grid.
 
     Args:
         answers: of a target search.
         rows: answers to take.
         sources: source box of each taken row [grid steps], shape (n, 2, 3).
         targets: likewise.
+        plans: of sources that are prisms in their boxes.
 
     Returns:
         Origins and ends [grid steps], shape (n, 3), float64, multiples of 2**-10.
@@ -52,5 +54,15 @@ def segments(
         return np.round(sign * (time[:, None] + xi) / w * 1024.0) / 1024.0
 
     enter, leave = times(sources)
+    # Inside the plan of a prism from the last of its sides that leads in to the first that leads out.
+    corners, own = plans.corners.astype(float), plans.rows
+    speed, at = sign[own] / w[own], (sign * xi / w)[own]
+    for k in range(4 if len(own) else 0):
+        along = corners[:, (k + 1) % 4] - corners[:, k]
+        start = along[:, 0] * (at[:, 1] - corners[:, k, 1]) - along[:, 1] * (at[:, 0] - corners[:, k, 0])
+        rate = along[:, 0] * speed[:, 1] - along[:, 1] * speed[:, 0]
+        met = np.divide(-start, rate, out=np.zeros(len(own)), where=rate != 0)
+        enter[own] = np.where(rate > 0, np.maximum(enter[own], met), enter[own])
+        leave[own] = np.where(rate < 0, np.minimum(leave[own], met), leave[own])
     first, last = times(targets)
     return place(leave - 0.25 * (leave - enter)), place(first + 0.25 * (last - first))

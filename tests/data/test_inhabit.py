@@ -4,7 +4,8 @@ from builders.awkward import ifc_case
 from viewcell.data.inhabit import find_inhabitable
 from viewcell.data.prepared import PreparedModel
 from viewcell.data.readers import read
-from viewcell.workbench.bake.cells import build_graph
+from viewcell.data.room_cells import room_covers
+from viewcell.workbench.bake.cells import build_graph, model_sources
 from viewcell.workbench.bake.manifest import Clock
 from viewcell.workbench.bake.settings import Settings
 
@@ -21,8 +22,12 @@ def test_rooms_name_their_cells(case):
 
 
 @pytest.mark.parametrize("case", ["rotated", "far_rotated"])
-def test_rooms_oblique_to_the_cells_name_what_holds_them(case):
-    assert {room for name in names(case) for room in name.split(", ")} == {"east", "west"}
+def test_rooms_oblique_to_the_cells_have_cells_of_their_own(case):
+    model = PreparedModel(read(ifc_case(case)))
+    graph = model_sources(model, Settings(), Clock()).graph
+    named = graph.inhabitable & (graph.cell_names != "")
+    assert {room for name in graph.cell_names[named] for room in name.split(", ")} == {"east", "west"}
+    assert all(room.covered for room in room_covers(model.scene, graph, model.closed))
 
 
 def test_rooms_without_a_body_are_found_by_flooding():

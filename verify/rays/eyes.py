@@ -10,8 +10,10 @@ import numpy as np
 
 from ...data.graph import CellGraph
 from ...data.kept import cell_volumes
+from ...data.plans import NO_PLANS, Plans
 from ...data.scene import OPAQUE, Role, Scene
 from ...data.solids import SolidIndex
+from ..exact.plan import inside_plans
 from .embree import embree_scene, lattice_points
 
 # Cells measured at most, and eyes in each.
@@ -93,7 +95,7 @@ def kept_by_eye(
     found, left = {}, RAYS_MOST
     # Small sets leave rays to large ones.
     for done, place in enumerate(np.argsort([len(own) for own in kept], kind="stable")):
-        eyes = draw_eyes(graph.cells[cells[place]], index, int(place), EYES, rng)
+        eyes = draw_eyes(graph.cells[cells[place]], index, int(place), EYES, rng, graph.plans.of(cells[place]))
         objects = rng.permutation(kept[place])[:OBJECTS_MOST]
         if not len(eyes) or not len(objects):
             continue
@@ -119,7 +121,9 @@ def _drawn_cells(graph: CellGraph, rng: np.random.Generator) -> tuple[np.ndarray
     return cells[places], times * ends[-1] / CELLS_MOST
 
 
-def draw_eyes(box: np.ndarray, index: SolidIndex, place: int, count: int, rng: np.random.Generator) -> np.ndarray:
+def draw_eyes(
+    box: np.ndarray, index: SolidIndex, place: int, count: int, rng: np.random.Generator, plan: Plans = NO_PLANS
+) -> np.ndarray:
     """At most so many random points of a box outside every solid [grid steps], shape (n, 3), float32.
 
     Args:
@@ -128,11 +132,13 @@ def draw_eyes(box: np.ndarray, index: SolidIndex, place: int, count: int, rng: n
         place: of the cell in it that holds the box.
         count: points wanted.
         rng: source of randomness.
+        plan: of the prism in the box that is meant.
     """
     share = rng.random((DRAWN * count, 3))
     points = (box[0] + share * (box[1] - box[0])).astype(np.float32)
     inside = ((points > box[0]) & (points < box[1])).all(axis=1)
     points = points[inside]
+    points = points[inside_plans(plan, np.zeros(len(points), int), points.astype(np.float64))]
     return points[index.outside(points.astype(np.float64), place)][:count]
 
 

@@ -99,6 +99,9 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
         if settings.refine_kept:
             graph, notes = _halved_graph(model, graph, notes, settings)
             clock.lap("halve")
+        graph, rooms = _with_rooms(model, graph)
+        notes |= rooms
+        clock.lap("portals")
         if not settings.seal:
             return Sources(model, graph, facts | notes, False, method)
         cracks = crack_portals(graph, settings.seal / scene.grid_m)
@@ -123,6 +126,23 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
         _check_inside(graph, portal_graph, method)
     clock.lap("view cells")
     return Sources(model, graph, facts | {"inhabitable_because": because}, True, method, portal_graph)
+
+
+def _with_rooms(model: PreparedModel, graph: CellGraph) -> tuple[CellGraph, dict]:
+    """The graph with view cells for rooms that its own do not cover, and what the manifest says of all rooms."""
+    spaces, inhabitable = model.scene.spaces, graph.inhabitable
+    bare = bool(spaces) and not (graph.cell_names[inhabitable] != "").any()
+    if bare:
+        # No cell along the axes lies in a room. Rooms have view cells of their own; only without any is it guessed.
+        graph.inhabitable = np.zeros(graph.cell_count, bool)
+    graph, covers = add_room_cells(model.scene, graph, model.closed)
+    rooms = [{"name": c.name, "covered": round(c.share, 4), **({"why": c.why} if c.why else {})} for c in covers]
+    notes = {"rooms": rooms}
+    if bare and graph.inhabitable.any():
+        notes["inhabitable_because"] = f"inside the model's {len(spaces)} rooms"
+    elif bare:
+        graph.inhabitable = inhabitable
+    return graph, notes
 
 
 def _halved_graph(model: PreparedModel, graph: CellGraph, notes: dict, settings: Settings) -> tuple[CellGraph, dict]:
@@ -166,19 +186,10 @@ def build_graph(model: PreparedModel, settings: Settings, clock: Clock) -> tuple
     graph = find_portals(cells[~dead], opaque)
     inhabited = find_inhabitable(scene, graph)
     graph.inhabitable, graph.cell_names = inhabited.mask, inhabited.names
-    reason = inhabited.reason
-    if scene.spaces and not (inhabited.names != "").any():
-        # No cell along the axes lies in a room, but rooms have view cells of their own.
-        graph.inhabitable = np.zeros(graph.cell_count, bool)
-        reason = f"inside the model's {len(scene.spaces)} rooms"
-    graph, covers = add_room_cells(scene, graph)
-    if not graph.inhabitable.any():
-        graph.inhabitable, reason = inhabited.mask, inhabited.reason
     clock.lap("portals")
     notes = {
-        "inhabitable_because": reason,
+        "inhabitable_because": inhabited.reason,
         "leak_cells": inhabited.leak,
-        "rooms": [{"name": c.name, "covered": round(c.share, 4), **({"why": c.why} if c.why else {})} for c in covers],
         "dead_cells": int(dead.sum()),
         "axial_area_m2": round(opaque.axial_area * scene.grid_m**2, 3),
         "axial_area_lost_m2": round(opaque.lost_area * scene.grid_m**2, 3),

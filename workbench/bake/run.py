@@ -193,7 +193,7 @@ def _leaks(sources: Sources, rows: tuple[Rows, Rows], settings: Settings, run: _
     graph, closed, scene = sources.graph, sources.closed, sources.model.scene
     fields = "portal_cells", "portal_axis", "portals"
     both = [np.concatenate([getattr(part, name) for part in (graph, closed)]) for name in fields]
-    whole = CellGraph(graph.cells, graph.inhabitable, graph.cell_names, *both)
+    whole = CellGraph(graph.cells, graph.inhabitable, graph.cell_names, *both, graph.plans)
     engine = _engine(replace(sources, graph=whole), settings, run.device)
     parts = [engine.visible(block, aim=False) for block in in_blocks(sources)]
     pairs = []

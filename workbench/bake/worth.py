@@ -9,7 +9,7 @@ from ...data.graph import CellGraph
 from ...data.kept import kept_shares, mean_kept
 from ...data.leaks import cells_behind_cracks
 from ...data.prepared import PreparedModel
-from ...data.uncovered import uncovered_rooms
+from ...data.room_cells import RoomCover, room_covers
 
 if TYPE_CHECKING:
     from ...data.store.bake_folder import BakeFolder
@@ -47,8 +47,10 @@ def worth(
         found["kept"] = kept_numbers(model, graph, pairs, seed)
         spaces = model.scene.spaces
         # Whoever gives view cells knows where they are not.
-        uncovered = uncovered_rooms(model.scene, graph) if facts.get("inhabitable_because") != "given" else []
-        found["uncovered_rooms"], rooms = uncovered, len(spaces)
+        uncovered = []
+        if facts.get("inhabitable_because") not in ("given", "octree"):
+            uncovered = [room for room in room_covers(model.scene, graph, model.closed) if not room.covered]
+        found["uncovered_rooms"], rooms = [room.name for room in uncovered], len(spaces)
         if spaces and graph.portal_count:
             leaky = int(cells_behind_cracks(model.scene, graph, CRACK_M).sum())
         warnings += _kept_words(found["kept"], _first_to_do(facts, bool(budget), bool(leak) or leaky > 0))
@@ -115,15 +117,15 @@ def _kept_words(kept: dict, do: str) -> list[str]:
     return [f"a view cell keeps {100 * kept[name]:.0f} % of the {name} on average, so little is culled; {do}"]
 
 
-def _room_words(uncovered: list[str], rooms: int) -> list[str]:
+def _room_words(uncovered: list[RoomCover], rooms: int) -> list[str]:
     if not uncovered:
         return []
-    named = ", ".join(repr(name) for name in uncovered[:ROOMS_NAMED])
+    named = ", ".join(f"{room.name!r} ({100 * room.share:.0f} %: {room.why})" for room in uncovered[:ROOMS_NAMED])
     more = f" and {len(uncovered) - ROOMS_NAMED:,} more" if len(uncovered) > ROOMS_NAMED else ""
-    verb = "has" if len(uncovered) == 1 else "have"
+    verb = "is" if len(uncovered) == 1 else "are"
     return [
-        f"{len(uncovered):,} of {rooms:,} rooms {verb} no view cell, so nothing is known of what one sees there: "
-        f"{named}{more}; --cells octree --method occluders looks from all that can be walked"
+        f"{len(uncovered):,} of {rooms:,} rooms {verb} not covered by view cells, so not all that one sees there is "
+        f"known: {named}{more}; --cells octree --method occluders looks from all that can be walked"
     ]
 
 

@@ -142,12 +142,14 @@ def test_rooms_without_a_cell_are_named(tmp_path):
     """Five at most, and how many more."""
     facts = viewcell.bake(rooms_of(9, dead=7), tmp_path / "a").manifest
     assert facts["uncovered_rooms"] == [f"room {k}" for k in range(2, 9)]
-    (warning,) = [text for text in facts["warnings"] if "rooms" in text and "no view cell" in text]
-    assert warning.startswith("7 of 9 rooms have no view cell")
-    assert "'room 2', 'room 3', 'room 4', 'room 5', 'room 6' and 2 more; " in warning
+    (warning,) = [text for text in facts["warnings"] if "rooms" in text and "not covered" in text]
+    assert warning.startswith("7 of 9 rooms are not covered by view cells")
+    assert (
+        "'room 2' (0 %: solids fill it), 'room 3'" in warning and "'room 6' (0 %: solids fill it) and 2 more" in warning
+    )
     assert viewcell.bake(rooms_of(3), tmp_path / "b").manifest["uncovered_rooms"] == []
     one = viewcell.bake(rooms_of(3, dead=1), tmp_path / "c").manifest["warnings"]
-    assert any(text.startswith("1 of 3 rooms has no view cell") and "more" not in text for text in one)
+    assert any(text.startswith("1 of 3 rooms is not covered by view cells") and "more" not in text for text in one)
 
 
 def test_boxes_that_were_given_are_not_said_to_miss_rooms(tmp_path):
