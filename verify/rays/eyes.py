@@ -91,7 +91,7 @@ def kept_by_eye(
     wanted = np.isin(source, cells)
     source, target = source[wanted], target[wanted]
     kept = [target[source == cell] for cell in cells]
-    kept = [own[scene.triangle_counts[own] > 0] for own in kept]
+    kept = [sight.aimable(own) for own in kept]
     found, left = {}, RAYS_MOST
     # Small sets leave rays to large ones.
     for done, place in enumerate(np.argsort([len(own) for own in kept], kind="stable")):
@@ -150,11 +150,16 @@ class Sight:
         opaque, self._owners = scene.triangles(*OPAQUE)
         glass, self._glass_owners = scene.triangles(Role.TRANSPARENT)
         self._opaque, self._glass = embree_scene(opaque), embree_scene(glass)
-        self._corners, self._starts = scene.triangles()[0], scene.triangle_starts
+        self._corners, owners = scene.triangles()
+        self._starts = np.searchsorted(owners, np.arange(len(scene.objects) + 1))
         self._clear = scene.object_mask(Role.TRANSPARENT)
         edges = (self._corners[:, 1:] - self._corners[:, :1]).astype(np.float64)
         # A little more than nothing, so that every object has somewhere to be aimed at.
         self._areas = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.cross(*edges.swapaxes(0, 1)), axis=1) + 1.0)])
+
+    def aimable(self, objects: np.ndarray) -> np.ndarray:
+        """Those of the objects that have triangles."""
+        return objects[self._starts[objects + 1] > self._starts[objects]]
 
     def around(self, eyes: np.ndarray, count: int) -> np.ndarray:
         """Ids, ascending, of the objects that so many even rays from each eye meet first, or through glass."""
