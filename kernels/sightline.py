@@ -11,6 +11,7 @@ import numpy as np
 import warp as wp
 
 from ..data.hierarchy import build_hierarchy
+from ..data.plans import NO_PLANS, Plans
 from .launch import CPU, Device, check_coordinates, launch_rows, node_columns
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -218,6 +219,10 @@ class Aims:
     end: wp.array[int]
     seed: wp.array[int]
     near: wp.array[int]
+    turned: wp.array[int]
+    corner: wp.array[wp.vec2d]
+    along: wp.array[wp.vec2d]
+    across: wp.array[wp.vec2d]
 
 
 @wp.struct
@@ -228,6 +233,17 @@ class Aim:
     end: wp.vec3d
     triangle: int
     state: wp.uint32
+
+
+@wp.func
+def start_at(aims: Aims, row: int, share: wp.vec3d) -> wp.vec3d:
+    """A point of the source: of its box, or of the prism in it."""
+    out = point_at(real(aims.source_lo[row]), real(aims.source_hi[row]), share)
+    if aims.turned[row] == 1:
+        plan = aims.corner[row] + aims.along[row] * share[0] + aims.across[row] * share[1]
+        out[0] = plan[0]
+        out[1] = plan[1]
+    return out
 
 
 @wp.func
@@ -350,7 +366,7 @@ def _aim(
         state = aim.state
         share = wp.vec3d(f64(wp.randf(state)), f64(wp.randf(state)), f64(wp.randf(state)))
         aim.state = state
-        aim.origin = point_at(real(aims.source_lo[row]), real(aims.source_hi[row]), share)
+        aim.origin = start_at(aims, row, share)
         # Odd attempts stay near the line that the axial model allows.
         near = aims.near[row] == 1 and attempt % 2 == 1
         if owner < 0:
@@ -412,9 +428,10 @@ def launch_aim(
     *,
     tries: int,
     boxed: bool = False,
+    plans: Plans = NO_PLANS,
     device: Device = CPU,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shoot from random points of each source box at its target until a sightline is clear.
+    """Shoot from random points of each source box, or of the prism in it, at its target until a sightline is clear.
 
     Args:
         scene: opaque triangles.
@@ -429,6 +446,7 @@ def launch_aim(
         tries: sightlines shot per row at most.
         boxed: aim only at the part of the object inside the row's box (most of the time: a part that random points on
             the object rarely hit is given up, and the point is used as it is).
+        plans: of sources that are prisms, parallelograms but for rounding: points may be a step outside.
         device: where to.
 
     Returns:
@@ -438,6 +456,7 @@ def launch_aim(
         InputError: a coordinate of a box beyond the grid.
     """
     count = len(sources)
+    corners = plans.filled(count, np.arange(count)).astype(float)
     aims = device.struct(
         Aims,
         source_lo=device.corners(sources[:, 0]),
@@ -451,6 +470,10 @@ def launch_aim(
         end=ranges[:, 1],
         seed=seeds,
         near=near,
+        turned=plans.places(count) >= 0,
+        corner=corners[:, 0],
+        along=corners[:, 1] - corners[:, 0],
+        across=corners[:, 3] - corners[:, 0],
     )
     found = device.zeros(count, wp.uint8)
     origins, ends = device.zeros(count, wp.vec3d), device.zeros(count, wp.vec3d)

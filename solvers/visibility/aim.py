@@ -112,6 +112,7 @@ class Sights:
             np.full(len(pairs), number > 0),
             tries=tries,
             boxed=number > 0,
+            plans=self.plans.take(source, len(self.cells)),
             device=self.device,
         )
         good = np.flatnonzero(found)
