@@ -421,8 +421,7 @@ def launch_aim(
     sources: np.ndarray,
     boxes: np.ndarray,
     hints: np.ndarray,
-    owners: np.ndarray,
-    ranges: np.ndarray,
+    objects: np.ndarray,
     seeds: np.ndarray,
     near: np.ndarray,
     *,
@@ -437,10 +436,10 @@ def launch_aim(
         scene: opaque triangles.
         targets: triangles to aim at.
         sources: source box of each row [grid steps], shape (n, 2, 3), int32.
-        boxes: target box of each row; used where owner is -1 or `boxed`.
+        boxes: target box of each row; used where there is no object to hit, or with `boxed`.
         hints: origin and end of a sightline that the axial model allows [grid steps], shape (n, 2, 3), float64.
-        owners: object to hit, or -1 to reach a point of the target box.
-        ranges: the object's first and past-the-last row in `targets`, shape (n, 2), int.
+        objects: object to hit and its first and past-the-last row in `targets`; or -1, 0 and 0 to reach a point of the
+            target box; shape (n, 3), int.
         seeds: of each row's random stream, shape (n,), int.
         near: rows whose every other sightline stays near the hint, shape (n,), bool.
         tries: sightlines shot per row at most.
@@ -465,9 +464,9 @@ def launch_aim(
         target_hi=device.corners(boxes[:, 1]),
         hint_origin=hints[:, 0],
         hint_end=hints[:, 1],
-        owner=owners,
-        begin=ranges[:, 0],
-        end=ranges[:, 1],
+        owner=objects[:, 0],
+        begin=objects[:, 1],
+        end=objects[:, 2],
         seed=seeds,
         near=near,
         turned=plans.places(count) >= 0,

@@ -145,8 +145,8 @@ def aimed(seed, at_objects, device=CPU, far=False, tiny=False):
     objects = rng.integers(0, owners.max() + 1, 1500) if at_objects else np.full(1500, NOBODY)
     ranges = np.column_stack([starts[objects], starts[objects + 1]]) if at_objects else np.zeros((1500, 2), int)
     found = launch_aim(
-        device_triangles(triangles, owners), aim_targets(triangles), sources, boxes, hints, objects, ranges,
-        np.arange(1500), np.arange(1500) % 2 == 0, tries=20, device=device,
+        device_triangles(triangles, owners), aim_targets(triangles), sources, boxes, hints,
+        np.column_stack([objects, ranges]),        np.arange(1500), np.arange(1500) % 2 == 0, tries=20, device=device,
     )  # fmt: skip
     return triangles, owners, sources, boxes, objects, found
 
