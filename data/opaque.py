@@ -55,11 +55,13 @@ class OpaquePlanes:
         boxes: for each axis, flat boxes [grid steps], shape (n, 2, 3), int32, sorted by plane.
         axial_area: opaque area on axial triangles, squared grid steps (overlaps counted once).
         lost_area: part of it dropped along oblique outlines.
+        sliver: rectangles that reach no further into a cell than this need not cut it [grid steps].
     """
 
     boxes: list[np.ndarray]
     axial_area: float
     lost_area: float
+    sliver: int = 0
 
     @cached_property
     def index(self) -> PlaneIndex:

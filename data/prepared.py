@@ -17,6 +17,7 @@ from .opaque import NO_PLANES, OpaquePlanes, opaque_planes
 from .patches import Patches, find_patches, join_outlines, rectangle_outlines
 from .regions import Regions, find_regions
 from .scene import OPAQUE, Role, Scene
+from .skewed import with_sections
 from .solids import closed_elements
 
 # Smaller pieces of furniture hide little and would fill the hierarchy of blockers.
@@ -51,8 +52,9 @@ class PreparedModel:
 
     @cached_property
     def planes(self) -> OpaquePlanes:
-        """Opaque rectangles of occluders: what cuts cells."""
-        return opaque_planes(self.scene.triangles(Role.OCCLUDER)[0])
+        """Opaque rectangles of occluders, on faces and inside walls that are nearly axial: what cuts cells."""
+        faces = opaque_planes(self.scene.triangles(Role.OCCLUDER)[0])
+        return with_sections(faces, [t for _, t in self.closed_of(Role.OCCLUDER)], self.scene.grid_m)
 
     @cached_property
     def blocking_planes(self) -> OpaquePlanes:
@@ -65,7 +67,7 @@ class PreparedModel:
         for axis, (mine, others) in enumerate(zip(large.boxes, self.planes.boxes, strict=True)):
             both = np.concatenate([others, mine[_flat_area(mine[:, 1] - mine[:, 0]) >= least]])
             boxes.append(both[np.argsort(both[:, 0, axis], kind="stable")])
-        return OpaquePlanes(boxes, self.planes.axial_area, self.planes.lost_area)
+        return OpaquePlanes(boxes, self.planes.axial_area, self.planes.lost_area, self.planes.sliver)
 
     @cached_property
     def regions(self) -> Regions:

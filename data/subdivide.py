@@ -29,7 +29,7 @@ def subdivide(opaque: OpaquePlanes, low: np.ndarray, high: np.ndarray, threshold
         box, inside = todo.pop()
         clipped, best = [], (0.0, -1, 0)
         for axis in range(3):
-            rectangles = _clip(inside[axis], box, axis)
+            rectangles = _clip(inside[axis], box, axis, opaque.sliver)
             clipped.append(rectangles)
             if len(rectangles):
                 share, plane = _best_plane(rectangles, box, axis, threshold)
@@ -44,12 +44,12 @@ def subdivide(opaque: OpaquePlanes, low: np.ndarray, high: np.ndarray, threshold
     return np.array(leaves, np.int32)
 
 
-def _clip(rectangles: np.ndarray, box: np.ndarray, axis: int) -> np.ndarray:
-    """Parts of flat boxes that lie strictly inside a box on their axis, with positive area."""
+def _clip(rectangles: np.ndarray, box: np.ndarray, axis: int, sliver: int = 0) -> np.ndarray:
+    """Parts of flat boxes that lie strictly inside a box on their axis and reach further into it than a sliver."""
     k = rectangles[:, 0, axis]
     rectangles = rectangles[(k > box[0, axis]) & (k < box[1, axis])]
     low, high = np.maximum(rectangles[:, 0], box[0]), np.minimum(rectangles[:, 1], box[1])
-    keep = (high - low)[:, OTHER_AXES[axis]].min(axis=1) > 0 if len(rectangles) else np.zeros(0, bool)
+    keep = (high - low)[:, OTHER_AXES[axis]].min(axis=1) > sliver if len(rectangles) else np.zeros(0, bool)
     return np.stack([low[keep], high[keep]], axis=1)
 
 
