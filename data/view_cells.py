@@ -9,6 +9,7 @@ import numpy as np
 
 from .errors import InputError
 from .graph import CellGraph
+from .plans import NO_PLANS, Plans
 from .prepared import PreparedModel
 from .scene import Scene
 from .solids import dead_cells
@@ -18,7 +19,9 @@ EYE_M = 2.0
 CELLS_MOST = 1_000_000
 
 
-def as_graph(cells: np.ndarray, names: np.ndarray | None = None, inhabitable: np.ndarray | None = None) -> CellGraph:
+def as_graph(
+    cells: np.ndarray, names: np.ndarray | None = None, inhabitable: np.ndarray | None = None, plans: Plans = NO_PLANS
+) -> CellGraph:
     """View cells as a graph without portals, all inhabitable unless told otherwise."""
     count = len(cells)
     return CellGraph(
@@ -28,6 +31,7 @@ def as_graph(cells: np.ndarray, names: np.ndarray | None = None, inhabitable: np
         np.zeros((0, 2), np.int32),
         np.zeros(0, np.int8),
         np.zeros((0, 2, 3), np.int32),
+        plans,
     )
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..data.scene import turned
 from .rays.confidence import Confidence
 
 SHOWN = 10
@@ -55,7 +56,8 @@ class CheckResult:
         seconds: by phase.
         grid_m: grid step in `unit`.
         unit: of what is printed.
-        origin: what to add to get the model's own place [m], 3 float64.
+        origin: what to add, after turning by `yaw_deg`, to get the model's own place [m], 3 float64.
+        yaw_deg: see `Scene.in_model`.
         snap_m: how far the model's vertices were moved at most [m].
         notes: what the reader of the result should know.
         asked: the model's path and how to read it; what a replay needs.
@@ -78,6 +80,7 @@ class CheckResult:
     grid_m: float = 1.0
     unit: str = "m"
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    yaw_deg: float = 0.0
     snap_m: float = 0.0
     notes: list[str] = field(default_factory=list)
     asked: dict[str, object] = field(default_factory=dict)
@@ -147,7 +150,8 @@ class CheckResult:
 
     def describe(self, pair: WrongPair) -> str:
         """A wrong-hidden pair and its sightline in a line, in the model's own metres."""
-        start, way = pair.origin * self.grid_m + self.origin, (pair.end - pair.origin) * self.grid_m
+        start, stop = (turned(end * self.grid_m, self.yaw_deg) + self.origin for end in (pair.origin, pair.end))
+        way = stop - start
         length = float(np.linalg.norm(way))
         target = (
             f"object {pair.target} {self.object_names[pair.target]!r}"

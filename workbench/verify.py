@@ -286,7 +286,10 @@ def _judge_batch(
             result.wrong_hidden += 1
             model = str(bake.manifest.get("source", ""))
             vectors = tuple(origin.tolist()), tuple((end - origin).tolist())
-            result.case = write_case(WrongHidden(str(Path(bake.folder).resolve()), model, cell, kind, target, *vectors))
+            line = bake.in_model(np.stack([origin, end]) * bake.grid_m)
+            ends = tuple(tuple(point) for point in line.tolist())
+            case = WrongHidden(str(Path(bake.folder).resolve()), model, cell, kind, target, *vectors, ends)
+            result.case = write_case(case)
             return True
     return False
 

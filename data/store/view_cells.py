@@ -10,7 +10,8 @@ import pyarrow.csv
 
 from ..errors import InputError
 from ..graph import CellGraph
-from ..scene import GRID_LIMIT, Scene
+from ..plans import NO_PLANS, Plans
+from ..scene import GRID_LIMIT, Scene, turned
 from ..view_cells import as_graph
 from .graph_folder import CELL_COLUMNS, inhabitable_column, numbers, optional_column
 from .scene_folder import one_line, read_table
@@ -19,6 +20,8 @@ from .scene_folder import one_line, read_table
 AROUND_M = 10.0
 # Beyond this, float64 does not tell a whole number from the next.
 WHOLE_FLOATS = 2**53
+# How far corners of plans off the grid are moved to keep a plan in, or around, the given one [grid steps].
+TWO_STEPS = 2.0
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,10 @@ def read_view_cells(path: str | Path, scene: Scene) -> CellGraph:
         ends = f"{view.ids.min()} to {view.ids.max()}"
         raise InputError(f"{path}: expected cell_id 0 to {len(order) - 1}, each once, found {ends}")
     graph = view.graph
-    return as_graph(graph.cells[order], graph.cell_names[order], graph.inhabitable[order])
+    plans = graph.plans.take(order, len(order))
+    if not np.array_equal(plans.rows, np.arange(len(order) - len(plans.rows), len(order))):
+        raise InputError(f"{path}: expected the highest cell_id for cells with a plan, found one below others")
+    return as_graph(graph.cells[order], graph.cell_names[order], graph.inhabitable[order], plans)
 
 
 def view_cells(
@@ -79,7 +85,8 @@ def view_cells(
         table: min_x ... max_z [m].
         scene: the model.
         where: what to call the table in errors.
-        placement: origin [m] and yaw [degrees] of the table's frame in the model's own; 0 and 0 by default.
+        placement: origin [m] and yaw [degrees] of the table's frame in the model's own; 0 and 0 by default. Boxes of
+            a frame that is turned against the scene's become prisms.
         inwards: snap so that every eye in the cell is in the given box, instead of the other way round.
     """
     require_columns_once(table, where)
@@ -90,22 +97,28 @@ def view_cells(
         raise InputError(f"{where}: expected at least one view cell, found an empty table")
     boxes = numbers(table, CELL_COLUMNS[1:], Path(where)).reshape(-1, 2, 3)
     origin, yaw_deg = placement or (np.zeros(3), 0.0)
-    if yaw_deg != scene.yaw_deg:
-        raise InputError(
-            f"{where}: expected view cells of a model turned by {scene.yaw_deg:g} degrees, found {yaw_deg:g}; boxes of "
-            "the model's own frame need one that is read or baked with yaw 0"
-        )
-    if yaw_deg and not np.array_equal(origin, scene.origin):
-        raise InputError(f"{where}: expected the origin {scene.origin} of the turned model, found {origin}")
-    shift = scene.origin - origin
-    steps = (boxes - shift) / scene.grid_m
+    ids = _cell_ids(table, where)
+    prisms = _corners(table, boxes, where)
+    if yaw_deg == scene.yaw_deg:
+        # The same frame, possibly from another place in it.
+        shift = turned(scene.origin - origin, -yaw_deg)
+        boxes = boxes - shift
+        prisms = {row: corners - shift[:2] for row, corners in prisms.items()}
+    else:
+        # Boxes of another frame stand at an angle in this one.
+        every = {row: _box_corners(box) for row, box in enumerate(boxes)} | prisms
+        prisms = {row: _moved(corners, origin, yaw_deg, scene) for row, corners in every.items()}
+        boxes = boxes - np.array([0.0, 0.0, 1.0]) * (scene.origin - origin)
+        for row, corners in prisms.items():
+            boxes[row, :, :2] = corners.min(axis=0), corners.max(axis=0)
+    steps = boxes / scene.grid_m
     if np.abs(steps).max() > GRID_LIMIT:
         raise InputError(
             f"{where}: expected view cells near the model, found a coordinate of {np.abs(boxes).max():g} m"
         )
     down, up = (np.ceil, np.floor) if inwards else (np.floor, np.ceil)
     cells = np.stack([down(steps[:, 0]), up(steps[:, 1])], axis=1).astype(np.int64)
-    ids = _cell_ids(table, where)
+    plans = _plans(prisms, cells, scene.grid_m, inwards, where)
     flat = np.flatnonzero(((boxes[:, 1] <= boxes[:, 0]) | (cells[:, 1] <= cells[:, 0])).any(axis=1))
     if len(flat):
         raise InputError(f"{where}: expected view cells with min below max, found cell {ids[flat[0]]} without volume")
@@ -115,7 +128,65 @@ def view_cells(
         raise InputError(
             f"{where}: expected view cells within {AROUND_M:g} m of the model, found cell {ids[away[0]]} outside"
         )
-    return ViewCells(as_graph(cells, optional_column(table, "name", ""), inhabitable_column(table, where)), ids)
+    graph = as_graph(cells, optional_column(table, "name", ""), inhabitable_column(table, where), plans)
+    return ViewCells(graph, ids)
+
+
+def _corners(table: pa.Table, boxes: np.ndarray, where: str) -> dict[int, np.ndarray]:
+    """Corners of the prisms of a table by row [m], each of shape (4, 2).
+
+    Raises:
+        InputError: a plan is not four corners, counter-clockwise and convex.
+    """
+    found = {}
+    for row, plan in enumerate(optional_column(table, "plan", None)):
+        if plan is None or not len(plan):
+            continue
+        corners = np.array(plan, float) if len(plan) == 8 else np.zeros(8)
+        corners = corners.reshape(4, 2)
+        along = np.roll(corners, -1, axis=0) - corners
+        bend = np.roll(along, -1, axis=0)
+        if not (along[:, 0] * bend[:, 1] > along[:, 1] * bend[:, 0]).all():
+            raise InputError(f"{where}: expected plans of four corners, convex and counter-clockwise, found {plan}")
+        found[row] = corners
+    return found
+
+
+def _box_corners(box: np.ndarray) -> np.ndarray:
+    (x, y, _), (u, v, _) = box
+    return np.array([[x, y], [u, y], [u, v], [x, v]])
+
+
+def _moved(corners: np.ndarray, origin: np.ndarray, yaw_deg: float, scene: Scene) -> np.ndarray:
+    """Plan corners of a table's frame in the scene's [m]."""
+    level = np.column_stack([corners, np.zeros(4)])
+    return turned(turned(level, yaw_deg) + origin - scene.origin, -scene.yaw_deg)[:, :2]
+
+
+def _plans(prisms: dict[int, np.ndarray], cells: np.ndarray, grid_m: float, inwards: bool, where: str) -> Plans:
+    """Plans of view cells on the grid; the boxes of those cells are put around them, in place.
+
+    Args:
+        prisms: corners by row [m].
+        cells: all boxes [grid steps], shape (n, 2, 3), int64.
+        grid_m: grid step [m].
+        inwards: round so that the plan lies in the given one, instead of the other way round.
+        where: what to call the table in errors.
+    """
+    rows = np.array(sorted(prisms), np.int64)
+    if not len(rows):
+        return NO_PLANS
+    if not np.array_equal(rows, np.arange(len(cells) - len(rows), len(cells))):
+        raise InputError(f"{where}: expected cells with a plan after all others, found one before row {rows[0] + 1}")
+    corners = np.array([prisms[row] for row in rows.tolist()]) / grid_m
+    exact = (corners == np.round(corners)).all(axis=(1, 2))
+    # A corner that moves two steps towards the middle, or away from it, moves both its sides by more than rounding.
+    away = corners - corners.mean(axis=1, keepdims=True)
+    length = np.maximum(np.linalg.norm(away, axis=2, keepdims=True), 1e-9)
+    moved = corners + away / length * (-TWO_STEPS if inwards else TWO_STEPS)
+    corners = np.round(np.where(exact[:, None, None], corners, moved)).astype(np.int64)
+    cells[rows, 0, :2], cells[rows, 1, :2] = corners.min(axis=1), corners.max(axis=1)
+    return Plans(rows, corners.astype(np.int32))
 
 
 def _cell_ids(table: pa.Table, where: str) -> np.ndarray:

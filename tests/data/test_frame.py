@@ -6,12 +6,10 @@ import trimesh
 from builders import random_solids
 from viewcell.data.buildings.glb import write_glb
 from viewcell.data.buildings.office import make_office
-from viewcell.data.errors import InputError
 from viewcell.data.frame import in_frame, wall_yaw
 from viewcell.data.prepared import PreparedModel
 from viewcell.data.readers import read
 from viewcell.data.scene import boxes_around, turned
-from viewcell.data.store.bake_folder import read_bake
 from viewcell.data.store.scene_folder import read_scene, write_scene
 from viewcell.workbench.bake.run import bake
 from viewcell.workbench.bake.settings import Settings
@@ -122,17 +120,22 @@ def test_a_house_on_the_axes_is_not_touched(tmp_path):
     assert plain.notes == auto.notes and auto.yaw_deg == 0.0
 
 
-def test_boxes_of_the_model_need_the_model_as_it_stands(tmp_path):
-    """Turned into another frame they would be oblique."""
+def test_boxes_of_the_model_are_prisms_in_a_turned_bake(tmp_path):
+    """The box lies in the prism, what is claimed of one holds for the other, and eyes in it judge either frame."""
     path, table = house(tmp_path / "a.obj", 17.0), tmp_path / "cells.csv"
     table.write_text("min_x,min_y,min_z,max_x,max_y,max_z\n0.2,1.5,0.5,0.6,1.9,1\n")
     made = bake(path, tmp_path / "b", settings=Settings(cells=str(table)), threads=1)
-    assert made.manifest["yaw_deg"] == 0.0 and read_bake(made.folder).scene.yaw_deg == 0.0
-    with pytest.raises(InputError, match="yaw"):
-        bake(path, tmp_path / "c", settings=Settings(cells=str(table), yaw="17"), threads=1)
-    turned_bake = bake(path, tmp_path / "d", threads=1)
-    with pytest.raises(InputError, match="turned by 17"):
-        check(turned_bake.folder, turned_bake.folder, table)
+    assert made.manifest["yaw_deg"] == 17.0 and made.manifest["format"] == 2
+    (plan,) = made.graph.plans.corners * made.grid_m
+    x, y, _ = made.in_model(np.column_stack([plan, np.zeros(4)])).T
+    assert x.min() <= 0.2 and x.max() >= 0.6 and y.min() <= 1.5 and y.max() >= 1.9
+    np.testing.assert_allclose(made.in_bake(made.in_model(plan_at := np.array([[1.0, 2.0, 3.0]]))), plan_at, atol=1e-12)
+    plain = bake(path, tmp_path / "c", settings=Settings(cells=str(table), yaw="0"), threads=1)
+    assert plain.manifest["yaw_deg"] == 0.0 and plain.manifest["format"] == 1
+    assert set(plain.seen(0)) <= set(made.potential(0)) and set(made.seen(0)) <= set(plain.potential(0))
+    for claim in (made, plain):
+        assert check(path, claim.folder, table, rays=20_000).ok
+        assert check(path, claim.folder, claim.folder, rays=20_000).ok
 
 
 @pytest.mark.parametrize("yaw", ["north", "inf", "400"])

@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 import viewcell
 from hypothesis import HealthCheck, Phase, assume, given, settings
-from viewcell.data.graph import OTHER_AXES
 from viewcell.data import frame
+from viewcell.data.graph import OTHER_AXES
 from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
 from viewcell.data.store.bake_folder import cells_table, portals_table
 from viewcell.data.verdict import Verdict

@@ -121,6 +121,7 @@ class WrongHidden:
         target: cell_id or object_id of what was hidden.
         origin: start of the sightline [grid steps], 3 float64.
         direction: origin + direction is its end [grid steps], 3 float64.
+        model_line: both ends in the model's own coordinates [m], for people.
     """
 
     bake: str
@@ -130,6 +131,7 @@ class WrongHidden:
     target: int
     origin: tuple[float, float, float]
     direction: tuple[float, float, float]
+    model_line: tuple[tuple[float, ...], ...] = ()
 
 
 def write_case(case: WrongHidden) -> Path:

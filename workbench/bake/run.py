@@ -220,7 +220,7 @@ def _engine(sources: Sources, settings: Settings, device: "Device") -> "Engine":
         from ...solvers.visibility.view_cell_engine import ViewCellEngine
 
         options |= {"method": sources.method, "portal_graph": sources.portal_graph, "vlod": settings.vlod}
-        return ViewCellEngine(sources.model, sources.graph.cells, **options)
+        return ViewCellEngine(sources.model, sources.graph.cells, plans=sources.graph.plans, **options)
     from ...solvers.visibility.portal_engine import PortalEngine
 
     return PortalEngine(sources.model, sources.graph, method=sources.method, **options)

@@ -138,9 +138,9 @@ class Settings(LevelSettings, MethodSettings, CellSettings, ModelSettings):
 
     @property
     def frame(self) -> dict[str, str | float]:
-        """The option `yaw` of `read`: boxes of the model's own frame would be oblique in another."""
+        """The option `yaw` of `read`."""
         if self.yaw == "auto":
-            return {"yaw": "auto"} if self.cells in ("", "portals", "octree") else {}
+            return {"yaw": "auto"}
         try:
             return {"yaw": float(self.yaw)}
         except ValueError:

@@ -1,7 +1,7 @@
 """The folder of a check: every wrong-hidden pair with its sightline, every view cell's numbers; and its replay.
 
-Metres (map units for a compiled map), relative to the manifest's `origin`; a sightline is `origin_*` to `origin_* +
-direction_*`, as in a bake.
+Metres (map units for a compiled map) in a frame that the manifest's `yaw_deg` and `origin` place; a sightline is
+`origin_*` to `origin_* + direction_*`, as in a bake.
 """
 
 import json
@@ -55,6 +55,7 @@ def write_check(result: CheckResult, folder: str | Path) -> None:
         "unit": result.unit,
         "grid": result.grid_m,
         "origin": result.origin.tolist(),
+        "yaw_deg": result.yaw_deg,
         "wrong_hidden": len(result.wrong),
         "confidence": result.confidence_line(),
         "rays": result.rays,
@@ -174,7 +175,7 @@ def _by_portals(model: Path, rows: pa.Table, origins: np.ndarray, ends: np.ndarr
     if model.suffix.lower() == ".prt":
         graph = axial_graph(read_prt(model), str(model))
     else:
-        graph = open_model(model, None, None, "open")
+        graph = open_model(model, {})
         if isinstance(graph, tuple):
             raise InputError(f"{model}: expected a cell graph, found a model with triangles")
     lists = rows["portals"].to_pylist()

@@ -223,7 +223,7 @@ class _Hunt:
             raise InputError(f"{scene.source or 'model'}: expected opaque triangles, found none")
         lines = Sightlines(*self.opaque)
         graph = view.graph
-        self.judge = Judge(graph, lines, Sightlines(*self.glass), contact_links(graph.cells))
+        self.judge = Judge(graph, lines, Sightlines(*self.glass), contact_links(graph.tiles.cells, graph.cell_count))
         sources = np.flatnonzero(graph.inhabitable)
         if not len(sources):
             raise InputError("cells: expected at least one inhabitable view cell, found none")
@@ -245,6 +245,7 @@ class _Hunt:
             seen={kind: np.zeros_like(matrix) for kind, matrix in claimed.items()},
             grid_m=scene.grid_m,
             origin=scene.origin,
+            yaw_deg=scene.yaw_deg,
             snap_m=scene.max_snap_m(),
             boxes=graph.cells,
         )
@@ -258,6 +259,7 @@ class _Hunt:
         objects = claimed.get("object", np.ones((len(self.result.cell_ids), len(self.result.object_names)), bool))
         falsifier = Falsifier(
             boxes=self.result.boxes[sources],
+            plans=self.judge.graph.plans.take(sources, self.judge.graph.cell_count),
             spots=self.spots,
             claimed=objects[sources],
             opaque=self.opaque,

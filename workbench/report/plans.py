@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch, Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 
 from ...data.graph import OTHER_AXES, CellGraph
@@ -302,12 +302,18 @@ class Painter:
         for kind in ("other", "hidden", "inhabitable", "unknown", "seen", "source"):
             chosen = np.flatnonzero(cut & (kinds == kind))
             edge = "#c9d1d9" if kind in ("other", "hidden") else CELL_EDGE
-            rectangles = [self._rectangle(box, section) for box in self.graph.cells[chosen]]
+            rectangles = [self._outline(int(cell), section) for cell in chosen]
             style = {"facecolor": COLOURS[kind], "edgecolor": edge, "linewidth": 0.4, "zorder": 1}
             axes.add_collection(PatchCollection(rectangles, match_original=False, **style))
         for triangles, colour in ((self._glass, GLASS), (self._opaque, WALL)):
             lines = section_lines(triangles, section) * self.grid_m
             axes.add_collection(LineCollection(lines, colors=colour, linewidths=0.9, zorder=3))
+
+    def _outline(self, cell: int, section: Section) -> Polygon | Rectangle:
+        """A cell as it is cut: its plan from above, else the box around it."""
+        if section.axis == 2 and cell >= self.graph.tile_count:
+            return Polygon(self.graph.plans.corners[cell - self.graph.tile_count] * self.grid_m)
+        return self._rectangle(self.graph.cells[cell], section)
 
     def _rectangle(self, box: np.ndarray, section: Section) -> Rectangle:
         u, v = section.across

@@ -103,6 +103,9 @@ def page_data(
             "inhabitable": pack(graph.inhabitable.astype(np.uint8)),
             "storey": pack(of_cell),
             "names": pack_json([str(name) for name in graph.cell_names]),
+            # View cells from this one on are prisms over four-sided plans.
+            "firstPlan": graph.tile_count,
+            "plans": pack(graph.plans.corners),
         },
         "portals": {
             "boxes": pack(graph.portals),
@@ -145,6 +148,7 @@ def _facts(bake: "BakeFolder", told: tuple[dict | None, list[str]]) -> dict:
         "sha256": str(found.get("sha256", "")),
         "gridMetres": bake.grid_m,
         "origin": [float(x) for x in bake.origin],
+        "yawDegrees": float(found.get("yaw_deg", 0.0)),
         "snapMetres": found.get("max_snap_m"),
         "claimsCells": bool(bake.claims_cells),
         "because": str(found.get("inhabitable_because", "")),

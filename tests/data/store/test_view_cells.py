@@ -1,11 +1,13 @@
 """Tables of view cells and of claims as they come: columns twice, ids that no float tells apart."""
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from builders.model_files import obj
 from builders.places import SHARED
 from viewcell.data.errors import InputError
+from viewcell.data.frame import in_frame
 from viewcell.data.readers import read
 from viewcell.data.store.claims import read_claims
 from viewcell.data.store.view_cells import read_rows, view_cells
@@ -92,3 +94,35 @@ def test_shared_tables(house, tmp_path, capsys):
     claims = {"cell_id": [10**18, 10**18 + 1], "object_id": [0, 0]}
     found = check(house, claims, TABLES / "cells_hugeid.csv", rays=2000)
     assert found.cell_ids.tolist() == [10**18, 10**18 + 1]
+
+
+@pytest.mark.parametrize("inwards", [False, True])
+@pytest.mark.parametrize("yaw", [17.0, -30.0, 45.0])
+def test_boxes_of_the_models_own_frame_are_prisms_in_a_turned_one(house, yaw, inwards):
+    """Not larger than they are by more than rounding, and on the side that is asked for."""
+    scene = in_frame(read(house), yaw)
+    view = view_cells(cells([0, 1]), scene, "cells", inwards=inwards)
+    assert view.graph.plans.rows.tolist() == [0, 1] and view.graph.tile_count == 0
+    rows = cells([0, 1]).to_pylist()
+    for row, plan, box in zip(rows, view.graph.plans.corners, view.graph.cells, strict=True):
+        level = np.column_stack([plan * scene.grid_m, np.zeros(4)])
+        x, y, _ = scene.in_model(level).T
+        low, high = (row["min_x"], row["min_y"]), (row["max_x"], row["max_y"])
+        grown = np.array([x.min() - low[0], y.min() - low[1], high[0] - x.max(), high[1] - y.max()])
+        grown = grown if inwards else -grown
+        assert (grown >= 0).all() and (grown < 5 * scene.grid_m).all()
+        np.testing.assert_array_equal(box[:, :2], [plan.min(axis=0), plan.max(axis=0)])
+
+
+@pytest.mark.parametrize(
+    ("plan", "told"),
+    [
+        ([0.0, 0.0, 1.0, 0.0], "four corners"),
+        ([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0], "counter-clockwise"),
+        ([0.0, 0.0, 1.0, 0.0, 0.4, 0.2, 0.0, 1.0], "convex"),
+    ],
+)
+def test_plans_that_are_none_are_bad_input(house, plan, told):
+    table = cells([0, 1]).append_column("plan", pa.array([None, plan], pa.list_(pa.float64())))
+    with pytest.raises(InputError, match=told):
+        view_cells(table, read(house), "cells")

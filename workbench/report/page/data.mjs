@@ -105,6 +105,22 @@ export class Bake {
     return boxAt(this.boxes[kind], id);
   }
 
+  /** Corners [x, y] of a cell's plan: of its box, or its own where it stands at an angle. */
+  plan(cell) {
+    const { firstPlan, plans } = this.cells,
+      [x, y, , u, v] = this.box("cell", cell);
+    if (cell < firstPlan) return [[x, y], [u, y], [u, v], [x, v]];
+    return [0, 1, 2, 3].map((k) => plans.subarray(8 * (cell - firstPlan) + 2 * k, 8 * (cell - firstPlan) + 2 * k + 2));
+  }
+
+  /** A point [grid steps] in the model's own coordinates [m]. */
+  inModel(p) {
+    const { origin, yawDegrees } = this.facts,
+      [x, y, z] = Array.from(p, (steps) => this.metres(steps)),
+      [cos, sin] = [Math.cos((yawDegrees * Math.PI) / 180), Math.sin((yawDegrees * Math.PI) / 180)];
+    return [x * cos - y * sin, x * sin + y * cos, z].map((value, k) => value + origin[k]);
+  }
+
   metres(steps) {
     return steps * this.facts.gridMetres;
   }

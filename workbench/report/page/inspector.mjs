@@ -125,10 +125,10 @@ function sightWords(state, target) {
     itself = target.kind === "cell" && target.id === cell;
   if (!sight) return [paragraph("small", itself ? "A view cell sees itself." : ELSEWHERE)];
   const [a, b] = sight.ends,
-    at = (p) => `(${p.map((v) => bake.metres(v).toFixed(2)).join(", ")})`,
+    at = (p) => `(${bake.inModel(p).map((v) => v.toFixed(2)).join(", ")})`,
     long = bake.metres(Math.hypot(...a.map((v, k) => b[k] - v))),
     n = sight.portals.length;
-  const parts = [paragraph("small", `Sightline of ${long.toFixed(2)} m from ${at(a)} to ${at(b)} m.`)];
+  const parts = [paragraph("small", `Sightline of ${long.toFixed(2)} m from ${at(a)} to ${at(b)} m in the model's own coordinates.`)];
   if (target.kind !== "cell" || !n) return parts;
   const path = paragraph("path", `Through ${n} portal${n === 1 ? "" : "s"}: cell ${cell}`);
   for (const { portal, cell: next } of pathOf(bake, cell, sight.portals))

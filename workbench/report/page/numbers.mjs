@@ -12,6 +12,7 @@ export function factTables(facts) {
     ["source", facts.source || "unknown"],
     ["grid step", `${(1000 * facts.gridMetres).toFixed(4)} mm`],
     ["origin", `(${facts.origin.join(", ")}) m`],
+    facts.yawDegrees && ["turned back by", `${facts.yawDegrees}°`],
     facts.snapMetres !== null && ["moved by snapping at most", `${(1000 * facts.snapMetres).toFixed(3)} mm`],
     facts.because && ["inhabitable cells", facts.because],
     facts.sha256 && ["SHA-256", facts.sha256],

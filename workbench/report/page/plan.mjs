@@ -36,18 +36,27 @@ function makeHatch(pen, pixelRatio) {
   return pattern;
 }
 
-/** Fills a rectangle; what is unknown is hatched, too, and the view cell has a border. */
-function paintBox({ pen, hatch }, r, look) {
+/** Fills a path; what is unknown is hatched, too, and the view cell has a border. */
+function paintPath({ pen, hatch }, path, look) {
   pen.fillStyle = FILL[look];
-  pen.fillRect(...r);
+  pen.fill(path);
   if (look === "unknown") {
     pen.fillStyle = hatch;
-    pen.fillRect(...r);
+    pen.fill(path);
   }
   if (look === "source") {
     Object.assign(pen, { lineWidth: 2.5, strokeStyle: "#111" });
-    pen.strokeRect(...r);
+    pen.stroke(path);
   }
+}
+
+/** A cell's plan, or an object's box, as a path in pixels. */
+function outlineOf({ view, bake }, kind, id) {
+  const path = new Path2D();
+  if (kind === "object") path.rect(...rectangle(view, bake.box(kind, id)));
+  else for (const [x, y] of bake.plan(id)) path.lineTo(toX(view, x), toY(view, y));
+  path.closePath();
+  return path;
 }
 
 /** Adds a line between two points on the ground to the path. */
@@ -72,17 +81,17 @@ function drawCells(frame) {
     apart = shown.filter(({ b }) => !cutBy(b, storey));
   pen.fillStyle = bake.facts.claimsCells ? "#e1e6ea" : "#fff";
   pen.fillRect(0, 0, view.width, view.height);
-  for (const { id, r } of bake.facts.claimsCells ? [...apart, ...cut] : [])
-    paintBox(frame, r, coloured ? WORD[state.verdicts.cell[id]] : inhabitable[id] ? "room" : "other");
+  for (const { id } of bake.facts.claimsCells ? [...apart, ...cut] : [])
+    paintPath(frame, outlineOf(frame, "cell", id), coloured ? WORD[state.verdicts.cell[id]] : inhabitable[id] ? "room" : "other");
   for (const { id, b, r } of [...cut, ...apart]) {
     if (!inhabitable[id] && Math.min(r[2], r[3]) <= 1.5) continue;
     Object.assign(pen, inhabitable[id] ? ROOM_EDGE : OTHER_EDGE);
     pen.setLineDash(cutBy(b, storey) ? [] : [4, 3]);
-    pen.strokeRect(...r);
+    pen.stroke(outlineOf(frame, "cell", id));
   }
   pen.setLineDash([]);
   const own = shown.find(({ id }) => id === state.cell);
-  if (coloured && own) paintBox(frame, own.r, "source");
+  if (coloured && own) paintPath(frame, outlineOf(frame, "cell", own.id), "source");
 }
 
 function drawObjects(frame) {
@@ -94,11 +103,11 @@ function drawObjects(frame) {
   for (const verdict of [HIDDEN, SEEN, UNKNOWN]) {
     Object.assign(pen, { strokeStyle: STROKE[WORD[verdict]], lineWidth: verdict === HIDDEN ? 0.7 : 1.4 });
     pen.setLineDash(verdict === UNKNOWN ? [5, 3] : []);
-    for (const { b, r } of shown.filter(({ id }) => state.verdicts.object[id] === verdict)) {
+    for (const { id: object, b, r } of shown.filter(({ id }) => state.verdicts.object[id] === verdict)) {
       const small = floorArea(b) < large;
       if (small) {
         pen.globalAlpha = verdict === HIDDEN ? 0.55 : 0.6;
-        paintBox(frame, r, WORD[verdict]);
+        paintPath(frame, outlineOf(frame, "object", object), WORD[verdict]);
         pen.globalAlpha = 1;
       }
       if (small || !cutBy(b, storey)) pen.strokeRect(...r);
@@ -130,7 +139,7 @@ function drawSource(frame) {
   const { pen, view, bake, state } = frame;
   if (state.layer !== "object" || bake.cells.storey[state.cell] !== state.storey) return;
   pen.globalAlpha = 0.55;
-  paintBox(frame, rectangle(view, bake.box("cell", state.cell)), "source");
+  paintPath(frame, outlineOf(frame, "cell", state.cell), "source");
 }
 
 function strokePortal(frame, b, lineWidth) {

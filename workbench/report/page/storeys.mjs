@@ -35,12 +35,20 @@ export function objectsOn(bake, number) {
     .sort((a, b) => floorArea(box(b)) - floorArea(box(a)));
 }
 
+/** Whether a point lies in a convex plan, its corners counter-clockwise. */
+export function inPlan(corners, [x, y]) {
+  return corners.every(([a, b], k) => {
+    const [c, d] = corners[(k + 1) % corners.length];
+    return (c - a) * (y - b) - (d - b) * (x - a) >= 0;
+  });
+}
+
 /** What of the chosen storey lies under a point: cells that the section cuts first, then the smallest. */
 function under({ bake, storey }, kind, [x, y], slack) {
   const box = (id) => bake.box(kind, id),
     cut = (id) => kind === "cell" && cutBy(box(id), bake.storeys[storey]);
   const holds = (b) => b[0] - slack <= x && x <= b[3] + slack && b[1] - slack <= y && y <= b[4] + slack;
-  const found = bake.on(kind, storey).filter((id) => holds(box(id)));
+  const found = bake.on(kind, storey).filter((id) => holds(box(id)) && (kind !== "cell" || inPlan(bake.plan(id), [x, y])));
   return found.sort((a, b) => cut(b) - cut(a) || floorArea(box(a)) - floorArea(box(b)));
 }
 

@@ -25,8 +25,10 @@ const LINES = [
 /** What the page's JSON holds, unpacked: steps of 10 cm. Cell 0 sees 0, 1 and perhaps 2; cell 2 sees 0, 1 and 2. */
 export function handmade() {
   return {
-    facts: { claimsCells: true, gridMetres: 0.1 },
+    facts: { claimsCells: true, gridMetres: 0.1, origin: [0, 0, 0], yawDegrees: 0 },
     cells: {
+      firstPlan: 1e9,
+      plans: new Int32Array(),
       boxes: Int32Array.from(CELLS.flat()),
       inhabitable: Uint8Array.of(1, 0, 1, 1),
       storey: Int8Array.of(0, -1, 0, 1),
