@@ -92,6 +92,28 @@ def cut_rooms(cells: np.ndarray, rooms: np.ndarray) -> np.ndarray:
     return cells
 
 
+def cut_large(cells: np.ndarray, chosen: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
+    """Cut chosen cells into equal parts, none of them longer or wider than a side.
+
+    Args:
+        cells: [grid steps], shape (n, 2, 3), int32.
+        chosen: which to cut, shape (n,), bool.
+        side: [grid steps].
+
+    Returns:
+        Boxes in the order of the cells, which they tile, shape (m, 2, 3), int32, and the cell of each, shape (m,).
+    """
+    boxes, parents = [], []
+    for number, (low, high) in enumerate(cells.astype(np.int64)):
+        parts = np.maximum(1, np.ceil((high - low)[:2] / side)).astype(int) if chosen[number] else np.ones(2, int)
+        x, y = ((low[k] + (high[k] - low[k]) * np.arange(parts[k] + 1) // parts[k]) for k in (0, 1))
+        for i in range(parts[0]):
+            for j in range(parts[1]):
+                boxes.append([[x[i], y[j], low[2]], [x[i + 1], y[j + 1], high[2]]])
+        parents += [number] * int(parts.prod())
+    return np.array(boxes, np.int32).reshape(-1, 2, 3), np.array(parents, np.int64)
+
+
 def merge(leaves: np.ndarray, opaque: OpaquePlanes) -> np.ndarray:
     """Merge neighbours that share one identical, wholly open face, largest faces first.
 

@@ -236,6 +236,13 @@ def _add_settings(group: argparse._ArgumentGroup) -> None:
         ("--refine-triangles", "refine_triangles", "N", _whole(1), "refine a cell that may see more"),
         ("--refine-gap", "refine_gap", "SHARE", _number, "refine a cell if more of its set than this is unknown"),
         (
+            "--largest-cell",
+            "largest_cell",
+            "M",
+            _number,
+            "cut inhabitable cells into parts no longer than this; any size by default",
+        ),
+        (
             "--refine-kept",
             "refine_kept",
             "RATIO",

@@ -22,7 +22,7 @@ from viewcell.data.solids import (
     triangles_meet_boxes,
     winding_numbers,
 )
-from viewcell.data.subdivide import cut_rooms, merge, subdivide
+from viewcell.data.subdivide import cut_large, cut_rooms, merge, subdivide
 from viewcell.verify.exact.sightline import Sightlines
 
 SEEDS = range(25)
@@ -444,3 +444,14 @@ def test_trap_sliver_of_a_room_is_not_inhabitable():
         cells, np.zeros(2, bool), np.full(2, ""), none, np.zeros(0, np.int8), np.zeros((0, 2, 3), np.int32)
     )
     np.testing.assert_array_equal(find_inhabitable(scene, graph).mask, [False, True])
+
+
+def test_large_cells_are_cut_into_equal_parts_that_tile_them():
+    cells = np.array([[[0, 0, 0], [10, 3, 4]], [[10, 0, 0], [20, 3, 4]], [[0, 3, 0], [4, 7, 4]]], np.int32)
+    boxes, parents = cut_large(cells, np.array([True, False, True]), 4.0)
+    assert parents.tolist() == [0, 0, 0, 1, 2]
+    assert boxes[:3, :, 0].tolist() == [[0, 3], [3, 6], [6, 10]] and boxes[3:].tolist() == cells[1:].tolist()
+    size = np.diff(boxes, axis=1)[:, 0]
+    assert size[[0, 1, 2, 4]][:, :2].max() <= 4
+    for cell in range(3):
+        assert size[parents == cell].prod(axis=1).sum() == np.diff(cells[cell], axis=0).prod()

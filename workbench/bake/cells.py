@@ -17,7 +17,7 @@ from ...data.solids import dead_cells
 from ...data.store.graph_folder import read_graph
 from ...data.store.scene_folder import scene_manifest
 from ...data.store.view_cells import read_view_cells
-from ...data.subdivide import cut_rooms, merge, subdivide
+from ...data.subdivide import cut_large, cut_rooms, merge, subdivide
 from ...data.view_cells import as_graph, octree_roots, walkable
 from .halve import halved
 from .manifest import Clock
@@ -64,8 +64,8 @@ def bare_sources(folder: Path, settings: Settings, clock: Clock) -> Sources:
     """
     if settings.seal:
         raise InputError(f"{folder}: expected a model to seal, found a bare graph")
-    if settings.refine_kept:
-        raise InputError(f"{folder}: expected a model whose cells to halve, found a bare graph")
+    if settings.refine_kept or settings.largest_cell:
+        raise InputError(f"{folder}: expected a model whose cells to cut, found a bare graph")
     if settings.split or settings.lods:
         raise InputError(f"{folder}: expected a model to split or to simplify, found a bare graph")
     if settings.method in ("occluders", "both", "vlod") or settings.cells not in ("", "portals"):
@@ -96,8 +96,12 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
         raise InputError("cells: expected octree or a table for the method vlod, found portals")
     if cells == "portals":
         graph, notes = build_graph(model, settings, clock)
+        if settings.largest_cell:
+            parts = cut_large(graph.cells, graph.inhabitable, settings.largest_cell / scene.grid_m)
+            graph, notes = _cut_graph(model, graph, notes, *parts)
         if settings.refine_kept:
-            graph, notes = _halved_graph(model, graph, notes, settings)
+            parts = halved(model, graph.cells, graph.inhabitable, settings.refine_kept, settings.seed)
+            graph, notes = _cut_graph(model, graph, notes, *parts)
             clock.lap("halve")
         graph, rooms = _with_rooms(model, graph)
         notes |= rooms
@@ -110,6 +114,8 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
         return Sources(model, graph, facts | notes, False, method, closed=closed)
     if settings.seal:
         raise InputError("seal: expected a model that is cut into portal cells, found one too large; --cells portals")
+    if settings.largest_cell:
+        raise InputError(f"largest-cell: expected portal cells, found {cells}; --cell-size bounds those of an octree")
     if settings.refine_kept:
         raise InputError(f"refine-kept: expected portal cells, found {cells}; --refine-gap refines an octree")
     if method == "auto":
@@ -145,9 +151,10 @@ def _with_rooms(model: PreparedModel, graph: CellGraph) -> tuple[CellGraph, dict
     return graph, notes
 
 
-def _halved_graph(model: PreparedModel, graph: CellGraph, notes: dict, settings: Settings) -> tuple[CellGraph, dict]:
-    """The graph with its cells halved where they keep much; halves are inhabitable, and called, as their cell."""
-    boxes, parents = halved(model, graph.cells, graph.inhabitable, settings.refine_kept, settings.seed)
+def _cut_graph(
+    model: PreparedModel, graph: CellGraph, notes: dict, boxes: np.ndarray, parents: np.ndarray
+) -> tuple[CellGraph, dict]:
+    """The graph with its cells cut into boxes; parts are inhabitable, and called, as their cell, their parent."""
     if len(boxes) == graph.cell_count:
         return graph, notes
     made = find_portals(boxes, model.planes)

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 METHODS = ("auto", "portals", "occluders", "both", "vlod")
 DEEPEST = 12
+# Cells are not cut into smaller parts than this [m].
+SMALLEST_PART_M = 0.5
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,8 @@ class CellSettings:
         depth: times that a cell of the octree may be refined.
         refine_triangles: a cell that may see more triangles is refined.
         refine_gap: a cell is refined if a larger share of what it may see is unknown.
+        largest_cell: inhabitable cells of portals are cut into parts no longer or wider than this [m]; 0 for any size.
+            A view cell larger than a room keeps what can be seen from its far end, too.
         refine_kept: cells of portals are halved, before they are baked, where eyes in them see together more than so
             many times as much as one of them does; 0 halves none.
     """
@@ -69,6 +73,7 @@ class CellSettings:
     depth: int = 2
     refine_triangles: int = 100_000
     refine_gap: float = 0.25
+    largest_cell: float = 0.0
     refine_kept: float = 0.0
 
 
@@ -152,6 +157,7 @@ class Settings(LevelSettings, MethodSettings, CellSettings, ModelSettings):
             ("threshold", self.threshold_m2, 0.0),
             ("seal", self.seal, 0.0),
             ("cell size", self.cell_size_m, 1e-3),
+            ("largest-cell", self.largest_cell or 1.0, SMALLEST_PART_M),
             ("refine-triangles", self.refine_triangles, 1),
             ("refine-gap", self.refine_gap, 0.0),
         ):
