@@ -81,6 +81,8 @@ def report(
 def choose_cells(bake: "BakeFolder") -> dict[int, str]:
     """Three telling inhabitable cells and why; fewer where they coincide."""
     sources = np.flatnonzero(bake.graph.inhabitable)
+    if speaks_of_cells(bake):
+        sources = sources[sources < bake.graph.tile_count]
     if not len(sources):
         return {}
     potential = _potential(bake)[sources].sum(axis=1)
@@ -99,33 +101,38 @@ def choose_cells(bake: "BakeFolder") -> dict[int, str]:
     return chosen
 
 
+def speaks_of_cells(bake: "BakeFolder") -> bool:
+    """Whether the bake claims what cells see of each other, from some inhabitable cell."""
+    return bake.claims_cells and bool(bake.graph.inhabitable[: bake.graph.tile_count].any() or not bake.scene)
+
+
 def _seen_counts(bake: "BakeFolder") -> np.ndarray:
     """Number of witnessed cells, or objects of a bake that claims nothing of cells, of every cell, shape (cells,)."""
-    table = bake.cell_to_cell if bake.claims_cells else bake.cell_to_object
+    table = bake.cell_to_cell if speaks_of_cells(bake) else bake.cell_to_object
     return np.bincount(visible_rows(table)["cell_id"].to_numpy(), minlength=bake.graph.cell_count)
 
 
 def _potential(bake: "BakeFolder") -> np.ndarray:
     """What `_seen_counts` counts, potentially visible, shape (cells, targets), bool."""
-    return bake.potential_cells if bake.claims_cells else bake.potential_objects
+    return bake.potential_cells[:, : bake.graph.tile_count] if speaks_of_cells(bake) else bake.potential_objects
 
 
 def _write(bake: "BakeFolder", chosen: dict[int, str], told: tuple[dict | None, list[str]], folder: Path) -> None:
-    painter = Painter(bake.graph, bake.scene, bake.grid_m, whole=not bake.claims_cells)
+    painter = Painter(bake.graph, bake.scene, bake.grid_m, whole=not speaks_of_cells(bake))
     name = model_name(bake)
     lines = [f"# {name}", ""]
     kept, warnings = told
     for text in warnings:
         lines += [f"> **Warning:** {text}.", ""]
     lines += [*_numbers(bake, kept), ""]
-    storeys = find_storeys(bake.graph, bake.grid_m) if bake.claims_cells else []
+    storeys = find_storeys(bake.graph, bake.grid_m) if speaks_of_cells(bake) else []
     lines += ["## Storeys", ""] if storeys else []
     for number, storey in enumerate(storeys):
         title = f"Storey {number}: floor at {storey.floor * bake.grid_m:.2f} m, {len(storey.cells)} inhabitable cells"
         painter.storey(storey, f"{name}, {title[0].lower()}{title[1:]}", folder / f"storey-{number}.png")
         lines += [f"### {title}", "", f"![{title}](storey-{number}.png)", "", STOREY_CAPTION, ""]
     lines += ["## Potentially visible sets", "", *_set_table(bake, chosen), ""]
-    shadows = None if bake.claims_cells else _Shadows(bake)
+    shadows = None if speaks_of_cells(bake) else _Shadows(bake)
     for cell, why in chosen.items():
         path = folder / f"cell-{cell}.png"
         if shadows is None:
@@ -188,11 +195,13 @@ def _draw_set(bake: "BakeFolder", painter: Painter, storeys: list[Storey], cell:
     """Draw one cell's set; returns the picture's title and caption."""
     seen_cells, cell_lines = _sights(bake, cell, "cell")
     _, object_lines = _sights(bake, cell, "object")
-    kinds = np.where(bake.potential_cells[cell], "unknown", "hidden")
+    kinds = np.where(bake.potential_cells[cell], "unknown", "hidden").astype(object)
+    # Nothing is claimed of cells that stand at an angle.
+    kinds[bake.graph.tile_count :] = "inhabitable"
     kinds[seen_cells] = "seen"
     kinds[cell] = "source"
     unknown, drawn = int((kinds == "unknown").sum()), np.concatenate([cell_lines, object_lines])
-    potential = int(bake.potential_cells[cell].sum())
+    potential = int(bake.potential_cells[cell, : bake.graph.tile_count].sum())
     storey = next(s for s in storeys if cell in s.cells)
     low, high = bake.graph.cells[cell, :, 2]
     section = plan_of(storey, bake.grid_m)
@@ -231,7 +240,7 @@ def _sizes(bake: "BakeFolder", kind: str) -> np.ndarray:
 def _unknown_targets(bake: "BakeFolder", cell: int) -> list[str]:
     """Table of the largest targets that have neither witness nor proof."""
     rows = []
-    kinds = [("cell", bake.potential_cells[cell])] if bake.claims_cells else []
+    kinds = [("cell", bake.potential_cells[cell, : bake.graph.tile_count])] if speaks_of_cells(bake) else []
     for kind, potential in (*kinds, ("object", bake.potential_objects[cell])):
         unknown = potential.copy()
         unknown[_sights(bake, cell, kind)[0]] = False
@@ -295,7 +304,7 @@ def _set_table(bake: "BakeFolder", chosen: dict[int, str]) -> list[str]:
     """One row for each chosen cell."""
     seen = _seen_counts(bake)
     lines = [
-        "Cells that a cell sees, itself included:" if bake.claims_cells else "Objects that a view cell sees:",
+        "Cells that a cell sees, itself included:" if speaks_of_cells(bake) else "Objects that a view cell sees:",
         "",
         "| cell | name | potential | seen | overestimate | unknown |",
     ]

@@ -5,7 +5,9 @@ import { cellsOn, extentOf, objectsOn } from "./storeys.mjs";
 export const HIDDEN = 0;
 export const UNKNOWN = 1;
 export const SEEN = 2;
-export const WORD = ["hidden", "unknown", "seen"];
+export const WORD = ["hidden", "unknown", "seen", "unclaimed"];
+// Of cells that a prism sees, or that see a prism, nothing is claimed.
+export const UNCLAIMED = 3;
 // Codes of the page's rows; what has no row is hidden.
 const ROW_UNKNOWN = 0;
 const ROW_SIGHTLINE = 1;
@@ -99,6 +101,15 @@ export class Bake {
     this.level = facts.claimsCells ? "Storey" : "Level";
     this.extent = extentOf(this);
     this.drawn = { cell: [], object: [] };
+  }
+
+  /** Verdicts of all targets from a view cell, by kind. */
+  verdicts(cell) {
+    const { firstPlan } = this.cells,
+      ofCells = this.relations.cell.verdicts(cell);
+    ofCells.fill(UNCLAIMED, cell < firstPlan ? firstPlan : 0);
+    if (cell >= firstPlan) ofCells[cell] = SEEN;
+    return { cell: ofCells, object: this.relations.object.verdicts(cell) };
   }
 
   box(kind, id) {

@@ -3,18 +3,19 @@ import { SEEN, UNKNOWN, WORD } from "./data.mjs";
 import { $, button, make, paragraph, tableCell } from "./dom.mjs";
 import { count, describe, label, nature, ratio, size } from "./words.mjs";
 
-const VERDICT = ["HIDDEN", "UNKNOWN", "VISIBLE"];
+const VERDICT = ["HIDDEN", "UNKNOWN", "VISIBLE", "NOT CLAIMED"];
 const REASON = [
   "proved: no open sightline joins the view cell to it.",
   "neither a sightline nor a proof was found; it stays in the potentially visible set.",
   "a stored sightline, checked exactly, shows it.",
+  "one of the two stands at an angle, or follows a room: only objects are looked at from there.",
 ];
 const ELSEWHERE = "Its sightline is in the bake's folder; this page holds those to the largest targets only.";
 
 /** Classes of targets that are counted apart: name, kind, which of the kind, and how many there are. */
 export function classesOf({ cells, facts, sources, cellCount, objectCount }) {
   const ofCells = [
-    ["Inhabitable cells", "cell", (id) => cells.inhabitable[id], sources.length],
+    ["Inhabitable cells", "cell", (id) => cells.inhabitable[id], sources.filter((id) => id < cells.firstPlan).length],
     ["Other cells", "cell", (id) => !cells.inhabitable[id], cellCount - sources.length],
   ];
   const ofObjects = [["Objects", "object", () => true, objectCount]];
@@ -37,7 +38,9 @@ export function showCell({ bake, cell }) {
   const where = `${bake.level} ${bake.cells.storey[cell]}; ${size(bake, b)}; z ${low} to ${high} m`;
   $("cell-facts").textContent = where + keptWords(bake, cell);
   $("cell-numbers").tBodies[0].replaceChildren(
-    ...classesOf(bake).flatMap(([name, kind, chosen, all]) => {
+    ...classesOf(bake)
+      .filter(([, kind]) => kind === "object" || cell < bake.cells.firstPlan)
+      .flatMap(([name, kind, chosen, all]) => {
       const n = bake.relations[kind].numbers(cell, chosen);
       const texts = [count(n.potential), count(n.seen), count(n.unknown), ratio(n.over)];
       const row = make("tr", { className: "with-bar" }, make("th", { scope: "row" }, name));

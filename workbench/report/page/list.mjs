@@ -10,11 +10,12 @@ const COLUMNS = ["cell", "name", "storey", "potential", "seen", "unknown", "over
 
 /** Ids of all targets of a kind by verdict; the view cell itself is left out. */
 export function targetsByVerdict({ cell, verdicts }, kind) {
-  const found = [[], [], []];
+  const found = [[], [], [], []];
   verdicts[kind].forEach((verdict, id) => {
     if (kind !== "cell" || id !== cell) found[verdict].push(id);
   });
-  return found;
+  // Of the rest nothing is claimed.
+  return found.slice(0, 3);
 }
 
 /** The ids, inhabitable cells first, then by the diagonal of their boxes, largest first. */

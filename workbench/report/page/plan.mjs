@@ -3,7 +3,7 @@ import { boxAt, HIDDEN, SEEN, UNKNOWN, WORD } from "./data.mjs";
 import { cutBy, floorArea } from "./storeys.mjs";
 import { fitted, outOfSight, rectangle, scaleBar, toX, toY, wantedHeight } from "./view.mjs";
 
-const FILL = { room: "#fbf3e2", seen: "#a9d8f3", unknown: "#f6d38a", hidden: "#fff", other: "#fff", source: "#d55e00" };
+const FILL = { room: "#fbf3e2", seen: "#a9d8f3", unknown: "#f6d38a", hidden: "#fff", other: "#fff", unclaimed: "#eceff1", source: "#d55e00" };
 const STROKE = { seen: "#0072b2", unknown: "#c27a00", hidden: "#a3acb4" };
 const ROOM_EDGE = { lineWidth: 0.9, strokeStyle: "#8a949d" };
 const OTHER_EDGE = { lineWidth: 0.4, strokeStyle: "#c4ccd3" };

@@ -31,9 +31,9 @@ export class State {
 
   /** Chooses a view cell and, unless told to keep it, the cell's storey; does nothing if it is none. */
   pick(cell, { keepStorey = false } = {}) {
-    const { cells, relations } = this.bake;
+    const { cells } = this.bake;
     if (!cells.inhabitable[cell]) return;
-    const verdicts = { cell: relations.cell.verdicts(cell), object: relations.object.verdicts(cell) };
+    const verdicts = this.bake.verdicts(cell);
     const moves = !keepStorey && cells.storey[cell] !== this.storey;
     const storey = moves ? { storey: cells.storey[cell] } : {};
     this.set({ cell, verdicts, target: null, hover: null, listed: LISTED, ...storey });
