@@ -145,7 +145,8 @@ def _covered_share(space: Space, points: np.ndarray, graph: CellGraph) -> float:
     near = graph.inhabitable & (graph.cells[:, 0] <= high).all(axis=1) & (graph.cells[:, 1] >= low).all(axis=1)
     held = np.zeros(len(points), bool)
     for cell in np.flatnonzero(near):
-        if name not in str(graph.cell_names[cell]).split(", "):
+        # Names of rooms may hold commas themselves.
+        if f", {name}, " not in f", {graph.cell_names[cell]}, ":
             continue
         inside = np.flatnonzero(
             ((points >= graph.cells[cell, 0]) & (points <= graph.cells[cell, 1])).all(axis=1) & ~held
@@ -273,12 +274,13 @@ def _heights(level: Space, low: float, top: float) -> np.ndarray:
 
 
 def _bends(level: Space) -> bool:
-    """Whether a room has upright faces off the axes of its frame."""
+    """Whether a room has upright faces off the axes of its frame, or sloped ones: its middle then says little."""
     corners = level.vertices[level.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normals, axis=1)
     oblique = (np.abs(normals[:, 2]) <= UPRIGHT * size) & (np.abs(normals[:, :2]).min(axis=1) > OBLIQUE * size)
-    return bool(oblique.any())
+    sloped = (np.abs(normals[:, 2]) > UPRIGHT * size) & (np.abs(normals[:, :2]).max(axis=1) > OBLIQUE * size)
+    return bool((oblique | sloped).any())
 
 
 def _lines(coordinates: np.ndarray, oblique: bool) -> np.ndarray:

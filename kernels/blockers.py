@@ -14,7 +14,6 @@ from ..data.blockers import Blockers
 from ..data.store import certificates
 from .curtains import (
     CURTAIN_WAYS,
-    FIRST_COMPOSITE,
     FIRST_CURTAIN,
     append_curtain_way,
     crosses,
@@ -23,7 +22,7 @@ from .curtains import (
     stops,
 )
 from .ends import CORNERS, Ends, append_corner, append_order, end_missed, has_corner, plan_times
-from .fences import FENCE_WAYS, FIRST_FENCE, append_fence_way, fence_met, fence_of
+from .fences import FENCE_WAYS, FIRST_FENCE, append_fence_way, fence_met, fence_of, may_miss
 from .graph import reflect_high, reflect_low
 from .launch import CPU, Device, node_columns
 from .stab import LIST_CAPACITY, vec6i
@@ -35,7 +34,7 @@ f64 = wp.float64
 WAYS = wp.constant(6)
 # What a node may be about instead of a blocker: FIRST_MISS + how an end's plan is missed.
 FIRST_MISS = wp.constant(certificates.FIRST_MISS)
-# Lookups that found nothing, and one whose line meets a curtain that no row says how to miss.
+# Lookups that found nothing, and one whose line meets a curtain, or misses an end, and no row says so.
 CLEAR = wp.constant(-1)
 DOUBTFUL = wp.constant(-2)
 
@@ -162,8 +161,8 @@ def scan(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2i:
     """The strongest blocker that the line crosses between leaving source and entering target, and its sides' order.
 
     Exact for integer w: every crossing time is an integer multiple of 1/4. Touching an edge of an axial blocker counts
-    as crossing. Returns (CLEAR, 0) if the line is clear, (DOUBTFUL, 0) if curtains are all that it may cross, and it
-    satisfies some way to miss each.
+    as crossing. Returns (CLEAR, 0) if the line is clear, (DOUBTFUL, 0) if it satisfies some way to miss each blocker
+    that it may cross.
     """
     out = w[0] * ends.s_hi[0] - xi[0]
     leave = wp.min(out, wp.min(w[1] * ends.s_hi[1] - xi[1], w[2] * ends.s_hi[2] - xi[2]))
@@ -201,6 +200,9 @@ def scan(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2i:
                         # A plane that cuts source or target leaves two more ways to miss the blocker.
                         if lo[axis] < ends.s_hi[axis] or cuts_target(lo[axis], ends.t_lo[axis], ends.strict):
                             value -= f64(3.0)
+                    elif best[0] == CLEAR:
+                        # Out of a prism, or before it, but inside the box around it: ways do not tell.
+                        best = wp.vec2i(DOUBTFUL, 0)
                 else:
                     rising = rises(axis, ends.octant)
                     if stops(lo, hi, rising, ends, w, xi, leave, enter):
@@ -208,7 +210,7 @@ def scan(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2i:
                         value = strength(share)
                         if first <= leave or last >= enter:
                             value -= f64(3.0)
-                    elif axis < FIRST_COMPOSITE and best[0] == CLEAR:
+                    elif best[0] == CLEAR:
                         if crosses(lo, hi, rising, w, xi, leave_plan, enter_plan):
                             best = wp.vec2i(DOUBTFUL, 0)
                 if value > best_strength:
@@ -234,7 +236,10 @@ def look_up(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2
         fence = fence_met(ends, w, xi)
         if fence >= 0:
             return wp.vec2i(FIRST_FENCE + fence, 0)
-    return scan(tree, ends, w, xi)
+    found = scan(tree, ends, w, xi)
+    if found[0] == CLEAR and may_miss(ends, w, xi):
+        found[0] = DOUBTFUL
+    return found
 
 
 @wp.func

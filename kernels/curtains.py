@@ -10,14 +10,13 @@ of itself (data/curtains.py).
 
 import warp as wp
 
-from ..data.curtains import COMPOSITE, RISING
+from ..data.curtains import RISING
 from .ends import Ends, append_order, append_past, beside
 from .stab import vec6i
 
 f64 = wp.float64
 
 FIRST_CURTAIN = wp.constant(RISING)
-FIRST_COMPOSITE = wp.constant(COMPOSITE)
 # Left of both ends, right of both; then, crossing it one way, under, over, in the target before and out of the source
 # after; then the same four crossing it the other way, which only a rising one can be.
 CURTAIN_WAYS = wp.constant(10)

@@ -22,6 +22,8 @@ FIRST_FENCE = wp.constant(certificates.FIRST_FENCE)
 LENGTHS = wp.constant(7)
 PIECES = wp.constant(certificates.FENCES)
 FENCE_WAYS = wp.constant(3)
+# Share of a time that floating point may be off by.
+SLACK = wp.constant(wp.float64(1.0e-9))
 
 
 @wp.struct
@@ -153,6 +155,29 @@ def fence_met(ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> int:
                 if found >= 0:
                     return found
     return -1
+
+
+@wp.func
+def may_miss(ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> bool:
+    """Whether a line may miss a prism by less than fences tell apart, in floating point and on the side of "it may"."""
+    for end in range(2):
+        used = ends.s_oblique
+        plan = ends.s_plan
+        lo = ends.s_lo
+        hi = ends.s_hi
+        if end == 1:
+            used = ends.t_oblique
+            plan = ends.t_plan
+            lo = ends.t_lo
+            hi = ends.t_hi
+        if used == 1:
+            inside = plan_times(plan, ends.turn, w, xi)
+            first = wp.max(inside[0], w[2] * lo[2] - xi[2])
+            last = wp.min(inside[1], w[2] * hi[2] - xi[2])
+            # A flat one is met at a single time.
+            if first > last or (first >= last - SLACK * (f64(1.0) + wp.abs(first)) and lo[2] < hi[2]):
+                return True
+    return False
 
 
 @wp.func

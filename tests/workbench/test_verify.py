@@ -8,19 +8,21 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from builders import corridors, small_house
+from builders import corridors, small_house, turned_house
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.graph import OTHER_AXES, CellGraph
 from viewcell.data.store.scene_folder import write_scene
 from viewcell.data.verdict import Verdict
 from viewcell.verify.cases.case_file import WrongHidden, load_cases, read_case, write_case
+from viewcell.verify.exact.plan import inside_plans
 from viewcell.verify.exact.segment import meets_flat_box
 from viewcell.verify.exact.sightline import Sightlines
 from viewcell.verify.exact.trace import contact_links, portal_links
 from viewcell.verify.findings import VerifyResult
 from viewcell.verify.proofs.certified import Certified
 from viewcell.verify.rays.adjudicate import Judge, Judgement
+from viewcell.verify.rays.free_space import FreeSpace
 from viewcell.verify.rays.starts import aim_points, cell_origins, frontier_points
 from viewcell.workbench import verify as workbench_verify
 from viewcell.workbench.bake.run import bake
@@ -464,3 +466,86 @@ def test_undecided_pairs_are_counted_among_the_unknown(tmp_path, monkeypatch):
     assert models_bench.undecided_percent(made) == pytest.approx(100 / size)
     found.verdict[:] = Verdict.VISIBLE
     assert models_bench.undecided_percent(made) == 0
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory):
+    return turned_house.turned_bake(tmp_path_factory.mktemp("turned") / "turned.bake", certify=True)
+
+
+def test_a_bake_with_prisms_stands(turned):
+    assert turned.manifest["format"] == 2 and len(turned.graph.plans.rows) == 2
+    hidden = ~turned.potential_objects[turned.graph.plans.rows]
+    assert hidden.sum() == 3
+    result = verify_bake(turned, rays=RAYS)
+    assert result.ok and result.wrong_hidden == 0 and result.object_witnesses.refuted == 0
+    assert result.object_witnesses.confirmed > 15 and result.dark_cells == 0
+    found = result.certificates
+    assert (found.failed_proofs, found.uncovered, found.covered) == (0, 0, 3) and found.proofs >= 3
+
+
+def test_what_is_left_out_of_a_prisms_rows_is_found(turned):
+    """Each object that a witness shows from a prism is missed when it is called hidden."""
+    kept = turned.potential_objects.copy()
+    shown = zip(turned.cell_to_object["cell_id"].to_pylist(), turned.cell_to_object["object_id"].to_pylist(),
+                turned.cell_to_object["verdict"].to_pylist(), strict=True)  # fmt: skip
+    found = 0
+    for cell, target, verdict in shown:
+        if verdict == "visible" and found < 6:
+            turned.potential_objects[cell, target] = False
+            result = verify_bake(turned, rays=RAYS)
+            assert result.wrong_hidden == 1 and not result.ok and result.certificates.uncovered == 1, (cell, target)
+            turned.potential_objects[:] = kept
+            found += 1
+    assert found == 6
+
+
+def beside_prism(bake):
+    """Object 2 is the end wall: a point within the box around the first prism but beyond the wall, and one inside it.
+
+    With the prism's cell, and the middle of the wall.
+    """
+    cell, plan = int(bake.graph.plans.rows[0]), bake.graph.plans.corners[0].astype(float)
+    low = bake.graph.cells[cell, 0].astype(float)
+    triangles, owners = bake.scene.triangles()
+    wall = np.round(triangles[owners == 2].reshape(-1, 3).mean(axis=0))
+    wall[2] = 1024.0
+    inside, outside = np.array([*np.round(plan.mean(axis=0)), 1024.0]), np.array([low[0] + 1, low[1] + 1, 1024.0])
+    return cell, inside, outside, wall
+
+
+def test_eyes_beside_a_prism_but_in_its_box_are_no_eyes(turned):
+    """From beyond the wall its outer face is in plain view, but no eye of the cell is there."""
+    judge = make_judge(turned)
+    cell, inside, outside, wall = beside_prism(turned)
+    for origin, expected in ((inside, Judgement.VISIBLE), (outside, Judgement.BLOCKED)):
+        assert judge.judge("object", cell, 2, origin, wall) == expected
+        rows = np.array([cell]), np.array([2]), origin[None], wall[None]
+        assert judge.judge_all("object", *rows)[0] == expected
+
+
+def test_rays_start_inside_prisms(turned):
+    sources = turned.graph.plans.rows
+    lines = make_judge(turned).lines
+    spots = cell_origins(turned.graph, sources, 64, lines, seed=0)
+    for cell, own in zip(sources, spots, strict=True):
+        assert len(own) > 8 and inside_plans(turned.graph.plans, np.full(len(own), cell), own.astype(float)).all()
+    plans = turned.graph.plans.take(sources, turned.graph.cell_count)
+    free = FreeSpace(turned.graph.cells[sources], spots, lines, plans)
+    rows = np.repeat(np.arange(len(sources)), 2000)
+    points, fresh, _ = free.draw(rows, np.random.default_rng(0))
+    assert fresh.mean() > 0.9 and inside_plans(plans, rows[fresh], points[fresh].astype(float)).all()
+
+
+def test_a_witness_from_beside_a_prism_is_refuted(turned):
+    table = turned.cell_to_object
+    cell, inside, outside, wall = beside_prism(turned)
+    row = row_of(table, cell, 2, "object_id")
+    for origin, refuted in ((inside, 0), (outside, 1)):
+        way = (wall - origin) * GRID
+        names = ("origin_x", "origin_y", "origin_z", "direction_x", "direction_y", "direction_z")
+        values = dict(zip(names, [*(origin * GRID), *way], strict=True))
+        turned.cell_to_object = changed(table, row, **values)
+        result = verify_bake(turned, rays=0)
+        turned.cell_to_object = table
+        assert result.object_witnesses.refuted == refuted

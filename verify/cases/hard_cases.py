@@ -47,6 +47,28 @@ class RegionCase:
 
 
 @dataclass(frozen=True)
+class ObliqueCase:
+    """As `RegionCase`, of ends that may be prisms.
+
+    Attributes:
+        name: unique.
+        expected: "visible" or "hidden".
+        cell: (low, high) of a box, or of an upright prism the four corners of its floor, counter-clockwise, and the
+            first one at its top.
+        target: likewise, whose surface is to be seen.
+        occluders: upright rectangles at any angle and level polygons.
+        origin: where the case came from, and what its answer is proved by.
+    """
+
+    name: str
+    expected: str
+    cell: Shape
+    target: Shape
+    occluders: list[Shape]
+    origin: str
+
+
+@dataclass(frozen=True)
 class SightlineCase:
     """What does an open segment meet?
 
@@ -186,6 +208,7 @@ class HardCases:
     stab: list[StabCase]
     shadow: list[ShadowCase]
     region: list[RegionCase]
+    oblique: list[ObliqueCase]
     sightline: list[SightlineCase]
     coverage: list[CoverageCase]
     backface: list[BackfaceCase]
@@ -234,6 +257,16 @@ def faces(shape: Shape) -> list[Shape]:
     corners = [[(low, high)[index >> axis & 1][axis] for axis in range(3)] for index in range(8)]
     chosen = BOX_FACES if not flat else BOX_FACES[2 * flat[0] + 1 :][:1]
     return [[corners[index] for index in face] for face in chosen]
+
+
+def end_faces(shape: Shape) -> list[Shape]:
+    """Faces of a box or of a prism of an `ObliqueCase`."""
+    if len(shape) == 2:
+        return faces(shape)
+    floor, top = shape[:4], shape[4][2]
+    above = [[*corner[:2], top] for corner in floor]
+    sides = [[floor[k], floor[(k + 1) % 4], above[(k + 1) % 4], above[k]] for k in range(4)]
+    return [floor[::-1], above, *sides]
 
 
 def fan(polygon: Shape) -> list[Shape]:
@@ -308,6 +341,27 @@ def _pairs(text: str, rows: int, columns: int) -> set[tuple[int, int]]:
 def _region(name: str, expected: str, cell: str, target: str, occluders: str, origin: str) -> RegionCase:
     _one_of(expected, "visible", "hidden")
     return RegionCase(name, expected, _box(cell), _box(target, flat=1), _shapes(occluders), origin)
+
+
+def _end(text: str) -> Shape:
+    """A box, or a prism with a convex floor."""
+    shape = _shape(text)
+    if len(shape) == 2:
+        return _box(text)
+    if len(shape) != 5 or shape[4][:2] != shape[0][:2] or len({z for _, _, z in shape[:4]}) > 1:
+        raise ValueError
+    turns = [
+        (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+        for a, b, c in ([shape[(k + step) % 4] for step in range(3)] for k in range(4))
+    ]
+    if min(turns) <= 0 or shape[4][2] <= shape[0][2]:
+        raise ValueError
+    return shape
+
+
+def _oblique(name: str, expected: str, cell: str, target: str, occluders: str, origin: str) -> ObliqueCase:
+    _one_of(expected, "visible", "hidden")
+    return ObliqueCase(name, expected, _end(cell), _end(target), _shapes(occluders), origin)
 
 
 def _sightline(name: str, expected: str, segment: str, excepted: str, triangles: str, origin: str) -> SightlineCase:
@@ -394,6 +448,7 @@ LOADERS: dict[str, Callable[[Path], list]] = {
     "stab": load_cases,
     "shadow": load_shadow_cases,
     "region": _loader("name; expected; cell; target; occluders; origin", _region),
+    "oblique": _loader("name; expected; cell; target; occluders; origin", _oblique),
     "sightline": _loader("name; expected; segment; excepted; triangles; origin", _sightline),
     "coverage": _loader("name; expected; viewpoint; size; polygons; box; pixels; origin", _coverage),
     "backface": _loader("name; expected; cell; surface; origin", _backface),

@@ -23,6 +23,7 @@ from ...verify.cases.hard_cases import GraphCase, HardCases, RegionCase, faces
 from ...verify.proofs.line_tree import Blocker
 from ...verify.proofs.line_tree import hides as line_tree_hides
 from ...verify.proofs.ways import End
+from .oblique import oblique_questions
 from .outcomes import Outcome, Outcomes, one_sided, two_sided, worst
 
 # Halvings, and lines tried, before a kernel gives up a case.
@@ -87,6 +88,14 @@ def target_search(cases: HardCases, device: Device) -> Outcomes:
             yield asked.case.name, one_sided(answers.verdict[0] == Verdict.HIDDEN, hidden)
         else:
             yield asked.case.name, two_sided(int(answers.verdict[0]), hidden)
+    for asked in oblique_questions(cases, device):
+        hidden = asked.case.expected == "hidden"
+        answers = launch_target_search(asked.tree, asked.boxes, TO_SURFACE, plans=asked.plans, cap=CAP, device=device)
+        # Plates are no blockers: visible is no proof beside them.
+        if asked.partial:
+            yield asked.case.name, one_sided(answers.verdict[0] == Verdict.HIDDEN, hidden)
+        else:
+            yield asked.case.name, two_sided(int(answers.verdict[0]), hidden)
 
 
 def line_trees(cases: HardCases, device: Device) -> Outcomes:
@@ -95,6 +104,14 @@ def line_trees(cases: HardCases, device: Device) -> Outcomes:
         answers = launch_target_search(asked.tree, asked.ends, TO_SURFACE, cap=CAP, device=device)
         words = launch_line_trees(asked.tree, asked.ends, TO_SURFACE, answers.nodes, device=device).words.tolist()
         if words and not line_tree_hides(*map(End, asked.ends.tolist()), True, words, asked.blockers):
+            yield asked.case.name, Outcome.WRONG
+        else:
+            yield asked.case.name, one_sided(bool(words), asked.case.expected == "hidden")
+    for asked in oblique_questions(cases, device):
+        work, options = (asked.tree, asked.boxes, TO_SURFACE), {"plans": asked.plans, "device": device}
+        answers = launch_target_search(*work, cap=CAP, **options)
+        words = launch_line_trees(*work, answers.nodes, **options).words.tolist()
+        if words and not line_tree_hides(*asked.ends, True, words, asked.blockers):
             yield asked.case.name, Outcome.WRONG
         else:
             yield asked.case.name, one_sided(bool(words), asked.case.expected == "hidden")

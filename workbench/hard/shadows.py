@@ -23,6 +23,7 @@ from ...solvers.visibility.projection import VlodSettings, vlod_hidden
 from ...verify.arithmetic import box_corners, cross, dot, minus, rational
 from ...verify.cases.hard_cases import HardCases, Shape, faces, fan
 from .meshes import scene_of
+from .oblique import around_end
 from .outcomes import Outcome, Outcomes, one_sided
 
 # Halvings, and lines tried, before a kernel gives up a case.
@@ -49,8 +50,13 @@ def _questions(cases: HardCases) -> list[_Question]:
 
 
 def shaft(cases: HardCases, device: Device) -> Outcomes:
-    """Halving as far as it takes."""
-    for asked in _questions(cases):
+    """Halving as far as it takes; what is a prism is asked about as the box around it."""
+    oblique = [
+        _Question(c.name, around_end(c.cell), around_end(c.target), c.occluders, c.expected == "hidden")
+        for c in cases.oblique
+    ]
+    apart = [q for q in oblique if any(h <= a or b <= low for a, b, low, h in zip(*q.box, *q.cell, strict=True))]
+    for asked in _questions(cases) + apart:
         model = PreparedModel(scene_of(asked.shapes))
         shields = device_shields(model.regions, model.patches, device)
         boxes = np.array([asked.cell, asked.box], np.int32)

@@ -7,7 +7,7 @@ import pytest
 from builders import random_buildings
 from viewcell.data.errors import InputError
 from viewcell.data.graph import OTHER_AXES
-from viewcell.data.store.graph_folder import CELL_COLUMNS, PORTAL_COLUMNS, first_overlap, read_graph
+from viewcell.data.store.graph_folder import CELL_COLUMNS, PORTAL_COLUMNS, first_overlap, plan_column, read_graph
 
 GRID_M = 2.0**-10
 
@@ -139,3 +139,61 @@ def test_overlaps_are_found_by_looking_at_every_pair():
         found += pair is not None
         assert pair is None or (both[pair] and pair[0] != pair[1])
     assert 50 < found < 250
+
+
+PLAN = [0.0, 0.0, 1.0, 0.5, 0.5, 1.5, -0.5, 1.0]
+
+
+def planned(plan=PLAN, **box):
+    """A change that adds a cell over a plan after all others."""
+
+    def change(cells, portals):
+        count = len(cells["cell_id"])
+        extent = {"min_x": -0.5, "min_y": 0.0, "min_z": 0.0, "max_x": 1.0, "max_y": 1.5, "max_z": 2.0} | box
+        for name, values in cells.items():
+            values.append(count if name == "cell_id" else extent[name])
+        cells["plan"] = [None] * count + [plan]
+
+    return change
+
+
+def test_plans_are_read(tmp_path):
+    cells, portals = columns_of(some_graph())
+    count = len(cells["cell_id"])
+    planned()(cells, portals)
+    graph, moved = read_graph(write(tmp_path, cells, portals))
+    assert moved == 0 and graph.plans.rows.tolist() == [count] and graph.tile_count == count
+    assert (graph.plans.corners[0].ravel() * GRID_M).tolist() == PLAN
+    assert graph.tiles.cell_count == count and not len(graph.tiles.plans.rows)
+    written = plan_column(graph.plans.filled(count + 1, np.arange(count + 1)), np.arange(count + 1) == count, GRID_M)
+    assert written.to_pylist() == [None] * count + [PLAN]
+
+
+def swap_last(cells, portals):
+    """The cell over a plan comes before another."""
+    planned()(cells, portals)
+    for name, values in cells.items():
+        if name != "cell_id":
+            values[-1], values[-2] = values[-2], values[-1]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (planned(PLAN[:6]), "expected plans of four corners, found another number of coordinates"),
+        (planned([*PLAN, 3.0, 3.0]), "expected plans of four corners, found another number"),
+        (planned(PLAN[::-1]), "expected convex plans, counter-clockwise"),
+        (planned([*PLAN[:2], *PLAN[6:], *PLAN[4:6], *PLAN[2:4]]), "expected convex plans, counter-clockwise"),
+        (planned([0.0, 0.0, 1.0, 0.5, 0.0, 0.5, -0.5, 1.5]), "expected convex plans, counter-clockwise"),
+        (planned(max_x=1.5), "that touch their box on every side, found another in cell"),
+        (planned(min_y=-0.5), "that touch their box on every side, found another in cell"),
+        (swap_last, "expected cells with a plan after all others, found one before cell"),
+    ],
+)
+def test_plans_that_are_none_are_one_line(change, message, tmp_path):
+    cells, portals = columns_of(some_graph())
+    change(cells, portals)
+    with pytest.raises(InputError) as told:
+        read_graph(write(tmp_path, cells, portals))
+    assert message in str(told.value) and "\n" not in str(told.value)
+    assert "cells.parquet" in str(told.value)

@@ -1,0 +1,152 @@
+"""Curtains of a model: each is opaque by the checker that shares nothing with what found it."""
+
+import numpy as np
+import pytest
+import trimesh
+from builders import random_solids
+from viewcell.data.curtains import COMPOSITE, FALLING, RISING, crossed, find_curtains, meeting
+from viewcell.data.prepared import PreparedModel
+from viewcell.data.scene import GRID_M
+from viewcell.verify.proofs.curtain import is_opaque
+from viewcell.verify.proofs.opaque import OpaqueSurfaces
+
+
+def upright(mesh, yaw_deg, place=(0.0, 0.0, 0.0)):
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(np.radians(yaw_deg), [0, 0, 1]))
+    mesh.apply_translation(place)
+    return mesh
+
+
+def frame(low, high, hole_low, hole_high, yaw_deg):
+    """A wall of thickness y with a window, as one closed element."""
+    xs, zs = [low[0], hole_low[0], hole_high[0], high[0]], [low[2], hole_low[1], hole_high[1], high[2]]
+    cells = [(i, k) for i in range(3) for k in range(3) if (i, k) != (1, 1)]
+    triangles = []
+    for i, k in cells:
+        box = random_solids.box([xs[i], low[1], zs[k]], [xs[i + 1], high[1], zs[k + 1]])
+        triangles.append(box.triangles)
+    soup = np.concatenate(triangles)
+    # Faces that two cells share are inside the wall: they stand there twice.
+    keys = [tuple(np.round(t.mean(axis=0), 6)) for t in soup]
+    middles = {}
+    for n, t in enumerate(soup):
+        corners = np.round(t, 6)
+        axis = int((np.ptp(corners, axis=0) == 0).argmax())
+        middles.setdefault((axis, corners[0, axis], *np.sort(corners, axis=0).ravel()), []).append(n)
+    assert keys
+    kept = [n for group in middles.values() if len(group) == 1 for n in group]
+    mesh = trimesh.Trimesh(soup[kept].reshape(-1, 3), np.arange(3 * len(kept)).reshape(-1, 3))
+    mesh.merge_vertices()
+    return upright(mesh, yaw_deg)
+
+
+def scenes():
+    for yaw in (1, 17, 30, 45, 61.3, 89):
+        yield (
+            f"walls at {yaw}",
+            [
+                upright(random_solids.box([0, 0, 0], [5, 0.2, 3]), yaw),
+                upright(random_solids.box([4.8, 0.2, 0], [5, 4, 3]), yaw),
+                upright(random_solids.box([1, 2, 0], [2, 4, 1]), yaw + 10),
+            ],
+        )
+    yield "a wall with a window", [frame([0, 0, 0], [6, 0.3, 3], [2, 1], [3.5, 2.2], 23.0)]
+    yield "a round column", [trimesh.creation.cylinder(0.5, 3.0, sections=16)]
+    yield (
+        "a mitred wall",
+        [
+            trimesh.creation.extrude_polygon(_polygon([[0, 0], [4, 3], [3.6, 3.2], [0.1, 0.5]]), 2.5),
+        ],
+    )
+    yield "leaning", [upright(random_solids.box([0, 0, 0], [3, 0.3, 3]), 20).apply_transform(
+        trimesh.transformations.rotation_matrix(0.3, [1, 0, 0]))]  # fmt: skip
+
+
+def _polygon(points):
+    from shapely import Polygon
+
+    return Polygon(points)
+
+
+def opaque(curtains, surfaces):
+    """Which curtains are opaque by the checker."""
+    found = []
+    for (low, high), axis in zip(curtains.boxes.tolist(), curtains.axis.tolist(), strict=True):
+        kind = axis - COMPOSITE + RISING if axis >= COMPOSITE else axis
+        a, b = [low[0], low[1]], [high[0], high[1]]
+        if kind == FALLING:
+            a, b = [low[0], high[1]], [high[0], low[1]]
+        found.append(is_opaque(surfaces, [a, b], low[2], high[2]))
+    return found
+
+
+@pytest.mark.parametrize(("name", "meshes"), list(scenes()), ids=[name for name, _ in scenes()])
+def test_every_curtain_is_opaque(name, meshes):
+    scene = random_solids.scene_of_meshes(meshes)
+    curtains = PreparedModel(scene).curtains
+    assert name == "leaning" or len(curtains.axis) > 3
+    assert all(opaque(curtains, OpaqueSurfaces(*scene.triangles())))
+
+
+def test_a_wall_with_a_window_has_no_curtain_over_it_and_some_beside():
+    scene = random_solids.scene_of_meshes([frame([0, 0, 0], [6, 0.3, 3], [2, 1], [3.5, 2.2], 23.0)])
+    boxes = PreparedModel(scene).curtains.boxes * GRID_M
+    tall = boxes[(boxes[:, 1, 2] - boxes[:, 0, 2]) > 2.5]
+    length = np.hypot(*(tall[:, 1] - tall[:, 0])[:, :2].T)
+    assert len(tall) and length.max() < 2.6 and length.max() > 1.5
+
+
+def test_open_elements_have_curtains_on_their_faces_only():
+    mesh = upright(random_solids.box([0, 0, 0], [5, 0.5, 3]), 17)
+    top = np.flatnonzero(mesh.face_normals[:, 2] > 0.5)
+    mesh.update_faces(np.arange(len(mesh.faces)) != top[0])
+    scene = random_solids.scene_of_meshes([mesh])
+    curtains = PreparedModel(scene).curtains
+    assert len(curtains.axis) == 4 and all(opaque(curtains, OpaqueSurfaces(*scene.triangles())))
+
+
+def test_curtains_reach_nearly_from_end_to_end():
+    scene = random_solids.scene_of_meshes([upright(random_solids.box([0, 0, 0], [5, 0.2, 3]), 17)])
+    boxes = PreparedModel(scene).curtains.boxes * GRID_M
+    assert np.hypot(*(boxes[:, 1] - boxes[:, 0])[:, :2].T).max() > 4.95
+    assert (boxes[:, 1, 2] - boxes[:, 0, 2]).max() == 3.0
+
+
+def test_models_along_the_axes_and_small_ones_have_none():
+    for meshes in (
+        [random_solids.box([0, 0, 0], [5, 0.2, 3])],
+        [upright(random_solids.box([0, 0, 0], [0.3, 0.2, 0.3]), 9)],
+    ):
+        assert len(PreparedModel(random_solids.scene_of_meshes(meshes)).curtains.axis) == 0
+    assert len(find_curtains([], np.zeros((0, 3, 3), np.int32), GRID_M).axis) == 0
+
+
+def test_what_may_meet_a_rectangle_holds_what_meets_it():
+    """Triangles near upright rectangles: whatever crosses one exactly is found in floating point."""
+    random, met = np.random.default_rng(0), 0
+    for _ in range(400):
+        quad = np.array([[0, 0, 0], [*random.integers(20, 60, 2), 40]])
+        quad[0, :2] = random.integers(-9, 9, 2)
+        triangles = random.integers(-30, 60, (20, 3, 3))
+        rows = set(meeting(quad[None], triangles, 1.0)[1].tolist())
+        for n, triangle in enumerate(triangles):
+            if crossed(quad, triangle):
+                met += 1
+                assert n in rows
+    assert met > 300
+
+
+@pytest.mark.parametrize(
+    ("triangle", "expected"),
+    [
+        ([[20, -10, 20], [20, 50, 20], [20, 20, 60]], True),
+        ([[20, -10, 40], [20, 50, 40], [20, 20, 60]], False),
+        ([[20, -10, 39], [20, 50, 39], [20, 20, 60]], True),
+        ([[0, 0, 0], [40, 30, 0], [40, 30, 40]], True),
+        ([[0, 0, 0], [0, 0, 40], [-20, 30, 20]], False),
+        ([[40, 30, 0], [40, 30, 40], [60, 50, 20]], False),
+        ([[0, 1, 0], [40, 31, 0], [40, 31, 40]], False),
+    ],
+)
+def test_touching_the_border_is_not_crossing(triangle, expected):
+    assert crossed(np.array([[0, 0, 0], [40, 30, 40]]), np.array(triangle)) == expected
