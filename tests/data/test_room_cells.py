@@ -48,7 +48,7 @@ def no_cells():
 
 def covered(space):
     """The graph with the room's own cells, and how it is covered."""
-    graph, (cover,) = add_room_cells(Scene([], [], [space]), no_cells())
+    graph, (cover,) = add_room_cells(Scene([], [], [space]), no_cells(), [])
     return graph, cover
 
 
@@ -146,8 +146,8 @@ def test_a_room_that_its_cells_cover_gets_no_others():
     graph = no_cells()
     graph = CellGraph(cells, np.ones(1, bool), np.array(["hall"], object), graph.portal_cells, graph.portal_axis,
                       graph.portals)  # fmt: skip
-    again, (cover,) = add_room_cells(Scene([], [], [space]), graph)
+    again, (cover,) = add_room_cells(Scene([], [], [space]), graph, [])
     assert cover.share == 1 and again.cell_count == 1
     named = CellGraph(cells, np.ones(1, bool), np.array(["other"], object), graph.portal_cells, graph.portal_axis,
                       graph.portals)  # fmt: skip
-    assert add_room_cells(Scene([], [], [space]), named)[0].cell_count > 1
+    assert add_room_cells(Scene([], [], [space]), named, [])[0].cell_count > 1
