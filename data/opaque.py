@@ -222,8 +222,10 @@ def _add_oblique(
     def at(v: np.ndarray) -> np.ndarray:
         return low[0] + (v - low[1]) * slope
 
-    # Half a step of padding covers the float64 rounding of `at` many times over and only ever drops cells.
+    # Half a step of padding covers the float64 rounding of `at` many times over and only ever drops cells. Beyond its
+    # own ends, where the next raster cell may be as wide as the wall, the edge never reaches.
     ends = np.sort(np.stack([at(vs[rows]), at(vs[rows + 1])]), axis=0) + np.array([[-0.5], [0.5]])
+    ends = np.clip(ends, min(a[0], b[0]), max(a[0], b[0]))
     first = np.maximum(np.searchsorted(us, ends[0], side="right") - 1, 0)
     last = np.minimum(np.searchsorted(us, ends[1]), len(us) - 1)
     for row, start, stop in zip(rows, first, last, strict=True):

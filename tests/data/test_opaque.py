@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from viewcell.data.buildings.prisms import prism
 from viewcell.data.graph import OTHER_AXES
 from viewcell.data.opaque import decompose, opaque_planes, plane_rectangles
 
@@ -30,6 +31,14 @@ def inside_rectangles(rectangles, doubled):
     """How many rectangles hold each point."""
     low, high = 2 * rectangles[:, 0].astype(np.int64), 2 * rectangles[:, 1].astype(np.int64)
     return ((doubled[:, None] > low) & (doubled[:, None] < high)).all(axis=2).sum(axis=1)
+
+
+def pierced(hole, *, size=4096):
+    """Triangles of a square with a hole, and the square's corners."""
+    square = np.array([(0, 0), (size, 0), (size, size), (0, size)])
+    mesh = prism(square, [np.array(hole)], 0.0, 1.0)
+    flat = mesh.vertices[mesh.faces][(mesh.vertices[mesh.faces][:, :, 2] == 0).all(axis=1)]
+    return flat[:, :, :2].astype(np.int32)
 
 
 def axial_triangles(rng, count, size=20):
@@ -85,6 +94,14 @@ def test_oblique_outlines_are_never_exceeded(seed, count, size):
     assert area == np.prod(high - low, axis=1).sum()
     middles = low + high
     assert (inside_rectangles(rectangles, middles) == 1).all()
+
+
+def test_an_oblique_edge_drops_nothing_beyond_its_ends():
+    """Beside the corner where the axial edge begins lies a raster cell that is as wide as the rest of the wall."""
+    hole = np.array([(1000, 1000), (2000, 1000), (2000, 2000), (1500, 2500), (1000, 2000)])
+    rectangles, _, _ = plane_rectangles(pierced(hole))
+    beside = np.array([[2 * 2001, 2 * 2001], [2 * 999, 2 * 2001], [2 * 1500, 2 * 2501]])
+    assert inside_rectangles(rectangles, beside).tolist() == [1, 1, 1]
 
 
 def test_most_of_a_gable_is_kept():
