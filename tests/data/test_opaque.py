@@ -160,3 +160,72 @@ def test_decompose_tiles_the_mask(seed):
     us, vs = (np.cumsum(rng.integers(1, 5, n + 1)) for n in mask.shape)
     doubled, _ = raster(us, vs)
     np.testing.assert_array_equal(inside_rectangles(decompose(mask, us, vs), doubled), mask.ravel().astype(int))
+
+
+def arched(width, rise):
+    """Corners of a window with a round top, whose curve takes the upper `rise`."""
+    turn = np.linspace(0, np.pi, 13)
+    top = np.round(np.column_stack([1000 + (np.cos(turn) + 1) * width / 2, 2000 + np.sin(turn) * rise]))
+    return np.concatenate([[[1000, 500], [1000 + width, 500]], top])
+
+
+ROUND = np.round(
+    2000 + 800 * np.column_stack([f(np.linspace(0, 2 * np.pi, 24, endpoint=False)) for f in (np.cos, np.sin)])
+)
+
+
+@pytest.mark.parametrize("hole", [arched(1500, 750), ROUND, [(500, 500), (3000, 500), (3500, 1000), (3000, 1500)]])
+def test_what_is_carved_leaves_a_rectangle_open(hole):
+    """Four rectangles about the box of the hole: no more is left out than that box, and no less."""
+    hole = np.array(hole)
+    triangles = pierced(hole)
+    rectangles, area, lost = plane_rectangles(triangles, carve_area=2**21)
+    low, high = hole.min(axis=0).astype(int), hole.max(axis=0).astype(int)
+    assert len(rectangles) == 4 and area == 4096**2 - (high - low).prod()
+    assert area + lost == sum(plane_rectangles(triangles)[1:])
+    assert not ((rectangles[:, 0] < high).all(axis=1) & (rectangles[:, 1] > low).all(axis=1)).any()
+    assert len(plane_rectangles(triangles)[0]) > 12
+
+
+@pytest.mark.parametrize(
+    ("hole", "carve_area"),
+    [(arched(1500, 750), 1000), ([(500, 500), (2500, 500), (2500, 1500), (500, 2500)], 600_000)],
+)
+def test_a_part_that_would_lose_much_keeps_its_staircase(hole, carve_area):
+    """The box around the arch is too large; that of the slanted edge is not, but half of it is opaque."""
+    triangles = pierced(hole)
+    rectangles, area, lost = plane_rectangles(triangles, carve_area=carve_area)
+    whole = plane_rectangles(triangles)
+    np.testing.assert_array_equal(rectangles, whole[0])
+    assert (area, lost) == whole[1:]
+
+
+def test_under_a_pillar_nothing_is_carved():
+    """A round pillar's foot lies on a floor that covers it all."""
+    square = np.array([[(0, 0), (4096, 0), (4096, 4096)], [(0, 0), (4096, 4096), (0, 4096)]], np.int32)
+    fan = [(ROUND[0], ROUND[k], ROUND[k + 1]) for k in range(1, len(ROUND) - 1)]
+    triangles = np.concatenate([square, np.array(fan).astype(np.int32)])
+    assert plane_rectangles(triangles, carve_area=2**22)[1] == plane_rectangles(triangles)[1] > 0.9 * 4096**2
+
+
+@given(st.integers(0, 2**32), st.integers(1, 5), st.sampled_from([20, 3000]), st.sampled_from([100, 2**20]))
+def test_what_is_carved_is_less_than_what_is_opaque(seed, count, size, carve_area):
+    rng = np.random.default_rng(seed)
+    triangles = np.concatenate([rng.integers(0, size, (count, 3, 2)).astype(np.int32), axial_triangles(rng, 2, size)])
+    a, b = (triangles[:, k] - triangles[:, 0] for k in (1, 2))
+    triangles = triangles[a[:, 0] * b[:, 1] != a[:, 1] * b[:, 0]]
+    carved, area, lost = plane_rectangles(triangles, carve_area=carve_area)
+    whole, kept, dropped = plane_rectangles(triangles)
+    assert area <= kept and area + lost == kept + dropped
+    # Middles of the raster that both are made of lie in no rectangle of the one without lying in one of the other.
+    us, vs = (np.unique(np.concatenate([r[:, :, c].ravel() for r in (carved, whole)])).astype(np.int64) for c in (0, 1))
+    doubled, _ = raster(us, vs)
+    assert (inside_rectangles(carved, doubled) <= inside_rectangles(whole, doubled)).all()
+
+
+def test_levels_are_never_carved():
+    flat = pierced(ROUND)
+    for axis in range(3):
+        triangles = np.zeros((len(flat), 3, 3), np.int32)
+        triangles[:, :, OTHER_AXES[axis]] = flat
+        assert (len(opaque_planes(triangles, carve_area=2**20).boxes[axis]) == 4) == (axis < 2)
