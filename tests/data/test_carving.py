@@ -146,9 +146,10 @@ def test_what_is_turned_and_snapped_is_still_rectangular():
     assert found.counts == (0, 6, 0) and found.wall_shares[4] == 1.0
 
 
-def test_faces_that_snapping_bends_are_one_each():
-    box = random_solids.box([0, 0, 0], [10, 4, 3])
-    box.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1, 2, 3]))
+@pytest.mark.parametrize("angle", [0.3, 0.5, 0.7, 0.9])
+def test_faces_that_snapping_bends_are_one_each(angle):
+    box = random_solids.box([0.123, 0.4567, 0], [10, 4, 3])
+    box.apply_transform(trimesh.transformations.rotation_matrix(angle, [1, 2, 3]))
     found = find_faces(random_solids.scene_of_meshes([box]))
     assert (found.counts, found.elements, found.clusters) == ((0, 0, 6), 1, 1)
 
