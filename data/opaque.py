@@ -3,13 +3,16 @@
 Per plane, all axial triangles are turned to one orientation, so the winding number of a point is the number of
 triangles that cover it, whatever overlaps, doubles or T-junctions there are. Shared edges cancel; the rest is rastered
 on its own compressed coordinates. A raster cell that an oblique outline crosses is dropped: the result is a subset of
-the true surface, so nothing is ever called blocked that is not.
+the true surface, so nothing is ever called blocked that is not. What cuts cells may leave out more (`carve_area`): the
+axial boxes around small oblique parts of upright outlines, such as arches, whose openings then are rectangles.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from .graph import OTHER_AXES
 
@@ -19,6 +22,8 @@ OBLIQUE_STEPS = 12
 OBLIQUE_STEP = 64
 # What comes within so many grid steps of an edge that was rounded to the grid is not called covered.
 ROUNDED_REACH = 2
+# The box around an oblique part that is carved out is no larger than so many times what it may lose.
+CARVED_BOX = 4
 
 
 class PlaneIndex:
@@ -72,12 +77,13 @@ class OpaquePlanes:
 NO_PLANES = OpaquePlanes([np.zeros((0, 2, 3), np.int32)] * 3, 0.0, 0.0)
 
 
-def opaque_planes(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS) -> OpaquePlanes:
+def opaque_planes(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS, carve_area: float = 0.0) -> OpaquePlanes:
     """Opaque rectangles of the axial triangles among `triangles`.
 
     Args:
         triangles: of opaque objects [grid steps], shape (m, 3, 3), int32.
         oblique_steps: most steps of the staircase along an oblique outline; 1 for none.
+        carve_area: as in `edge_rectangles`, of upright planes; levels are never carved.
     """
     boxes, area, lost = [], 0.0, 0.0
     for axis in range(3):
@@ -88,9 +94,8 @@ def opaque_planes(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS) -> 
         ends = np.searchsorted(chosen[order, 0, axis], planes, side="right")
         begin, found = 0, [np.zeros((0, 2, 3), np.int32)]
         for k, end in zip(planes, ends, strict=True):
-            rectangles, kept, dropped = plane_rectangles(
-                chosen[order[begin:end]][:, :, OTHER_AXES[axis]], oblique_steps
-            )
+            corners = chosen[order[begin:end]][:, :, OTHER_AXES[axis]]
+            rectangles, kept, dropped = plane_rectangles(corners, oblique_steps, carve_area if axis < 2 else 0.0)
             begin, area, lost = end, area + kept + dropped, lost + dropped
             flat_boxes = np.full((len(rectangles), 2, 3), k, np.int32)
             flat_boxes[:, :, OTHER_AXES[axis]] = rectangles
@@ -99,17 +104,20 @@ def opaque_planes(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS) -> 
     return OpaquePlanes(boxes, area, lost)
 
 
-def plane_rectangles(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS) -> tuple[np.ndarray, float, float]:
+def plane_rectangles(
+    triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS, carve_area: float = 0.0
+) -> tuple[np.ndarray, float, float]:
     """Disjoint rectangles inside the union of triangles of one plane.
 
     Args:
         triangles: corners (u, v) [grid steps], shape (m, 3, 2), int32, any orientation.
         oblique_steps: as in `opaque_planes`.
+        carve_area: as in `edge_rectangles`.
 
     Returns:
         Rectangles, shape (n, 2, 2), int32 (low, high corner); their area; the area dropped along oblique outlines.
     """
-    return edge_rectangles(_outline(triangles.astype(np.int64)), oblique_steps)
+    return edge_rectangles(_outline(triangles.astype(np.int64)), oblique_steps, carve_area=carve_area)
 
 
 def edge_rectangles(
@@ -118,6 +126,7 @@ def edge_rectangles(
     *,
     rounded: np.ndarray | None = None,
     anywhere: bool = False,
+    carve_area: float = 0.0,
 ) -> tuple[np.ndarray, float, float]:
     """Disjoint rectangles inside closed outlines.
 
@@ -128,6 +137,8 @@ def edge_rectangles(
         rounded: edges that may be off by half a step; what comes within ROUNDED_REACH of them is left out. By default
             none; shape (m,), bool.
         anywhere: inside is where the winding number is not 0; otherwise where it is positive.
+        carve_area: oblique parts of the outlines are left out with the boxes around them where that loses no more than
+            this area [squared grid steps] in each; 0 for none.
 
     Returns:
         As `plane_rectangles`.
@@ -153,6 +164,11 @@ def edge_rectangles(
     winding = winding.cumsum(axis=0)[:-1, :-1]
     covered = winding != 0 if anywhere else winding > 0
     size = np.outer(np.diff(us), np.diff(vs)).astype(float)
+    if carve_area and oblique.any():
+        for window in _carved(edges[oblique], us, vs, carve_area):
+            # Where nothing is open, as on the floor under a pillar, there is no opening to make a rectangle of.
+            if (size * covered)[window].sum() <= carve_area and (~covered & ~crossed)[window].any():
+                crossed[window] = True
     kept = covered & ~crossed
     lost = float(size[crossed & covered].sum())
     return decompose(kept, us, vs), float(size[kept].sum()), lost
@@ -192,6 +208,22 @@ def _beside(coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return coordinates - 2 * ROUNDED_REACH, coordinates + 2 * ROUNDED_REACH
 
 
+def _carved(edges: np.ndarray, us: np.ndarray, vs: np.ndarray, carve_area: float) -> list[tuple[slice, slice]]:
+    """Windows of the raster: the box around each connected run of oblique edges, if it is not too large.
+
+    Source: Lei and Ouhyoung, "Carving", section 4.1: the carving volume is the box around the edges of a cluster.
+    """
+    points, ends = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+    low, high = ends.reshape(-1, 2).T
+    count, run = connected_components(coo_matrix((np.ones(len(low)), (low, high)), (len(points),) * 2), directed=False)
+    boxes = np.stack([np.full((count, 2), points.max()), np.full((count, 2), points.min())], axis=1)
+    np.minimum.at(boxes[:, 0], run, points)
+    np.maximum.at(boxes[:, 1], run, points)
+    boxes = boxes[np.prod((boxes[:, 1] - boxes[:, 0]).astype(float), axis=1) <= CARVED_BOX * carve_area]
+    u, v = np.searchsorted(us, boxes[:, :, 0]), np.searchsorted(vs, boxes[:, :, 1])
+    return [(slice(*a), slice(*b)) for a, b in zip(u.tolist(), v.tolist(), strict=True)]
+
+
 def _mark_near(a: np.ndarray, b: np.ndarray, us: np.ndarray, vs: np.ndarray, crossed: np.ndarray) -> None:
     """Mark the raster cells that come within ROUNDED_REACH of the edge ab."""
     if abs(int(b[0]) - int(a[0])) > abs(int(b[1]) - int(a[1])):
@@ -224,8 +256,10 @@ def _add_oblique(
     def at(v: np.ndarray) -> np.ndarray:
         return low[0] + (v - low[1]) * slope
 
-    # Half a step of padding covers the float64 rounding of `at` many times over and only ever drops cells.
+    # Half a step of padding covers the float64 rounding of `at` many times over and only ever drops cells. Beyond its
+    # own ends, where the next raster cell may be as wide as the wall, the edge never reaches.
     ends = np.sort(np.stack([at(vs[rows]), at(vs[rows + 1])]), axis=0) + np.array([[-0.5], [0.5]])
+    ends = np.clip(ends, min(a[0], b[0]), max(a[0], b[0]))
     first = np.maximum(np.searchsorted(us, ends[0], side="right") - 1, 0)
     last = np.minimum(np.searchsorted(us, ends[1]), len(us) - 1)
     for row, start, stop in zip(rows, first, last, strict=True):

@@ -22,6 +22,9 @@ from .solids import closed_elements
 
 # Smaller pieces of furniture hide little and would fill the hierarchy of blockers.
 BLOCKING_DETAIL_M2 = 0.1
+# Oblique details of outlines, such as arches, are left out of what cuts cells with the boxes around them, if that loses
+# no more than this in each.
+CARVED_M2 = 1.0
 # Closed elements with less are not cut at an angle.
 CURTAIN_M2 = 1.0
 # Oblique surfaces below this hide little, and are not made of triangles below the share.
@@ -51,23 +54,31 @@ class PreparedModel:
         return [(object_id, triangles) for object_id, triangles in self.closed if wanted[object_id]]
 
     @cached_property
+    def surfaces(self) -> OpaquePlanes:
+        """Opaque rectangles of occluders, on faces and inside walls that are nearly axial."""
+        return self._with_sections(opaque_planes(self.scene.triangles(Role.OCCLUDER)[0]))
+
+    @cached_property
     def planes(self) -> OpaquePlanes:
-        """Opaque rectangles of occluders, on faces and inside walls that are nearly axial: what cuts cells."""
-        faces = opaque_planes(self.scene.triangles(Role.OCCLUDER)[0])
+        """Those that cut cells: with oblique details carved out, so that arches leave rectangles open."""
+        carved = opaque_planes(self.scene.triangles(Role.OCCLUDER)[0], carve_area=CARVED_M2 / self.scene.grid_m**2)
+        return self._with_sections(carved)
+
+    def _with_sections(self, faces: OpaquePlanes) -> OpaquePlanes:
         return with_sections(faces, [t for _, t in self.closed_of(Role.OCCLUDER)], self.scene.grid_m)
 
     @cached_property
     def blocking_planes(self) -> OpaquePlanes:
-        """The same and the large ones of details (furniture): what blocks."""
+        """Surfaces of occluders, carved or not, and the large ones of details (furniture): what blocks."""
         triangles, _ = self.scene.triangles(Role.DETAIL)
         least = BLOCKING_DETAIL_M2 / self.scene.grid_m**2
         boxes = []
         # Half of a large rectangle is a large triangle; the fans that close round tops are not worth looking at.
         large = opaque_planes(triangles[_flat_area(np.ptp(triangles, axis=1)) >= least], oblique_steps=1)
-        for axis, (mine, others) in enumerate(zip(large.boxes, self.planes.boxes, strict=True)):
+        for axis, (mine, others) in enumerate(zip(large.boxes, self.surfaces.boxes, strict=True)):
             both = np.concatenate([others, mine[_flat_area(mine[:, 1] - mine[:, 0]) >= least]])
             boxes.append(both[np.argsort(both[:, 0, axis], kind="stable")])
-        return OpaquePlanes(boxes, self.planes.axial_area, self.planes.lost_area, self.planes.sliver)
+        return OpaquePlanes(boxes, self.surfaces.axial_area, self.surfaces.lost_area, self.surfaces.sliver)
 
     @cached_property
     def regions(self) -> Regions:

@@ -1,11 +1,16 @@
 """A finished bake in a few lines, for people."""
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from ..data.carving import BANDS
+
 if TYPE_CHECKING:
+    from ..data.carving import Faces
     from ..data.store.bake_folder import BakeFolder
 
 SKIPPED_SHOWN = 3
+KINDS = ("axial", "semi-axial", "non-axial")
 
 
 def summary(bake: "BakeFolder") -> str:
@@ -64,6 +69,23 @@ def kept_rows(kept: dict) -> list[tuple[str, str]]:
         rows += [(f"kept / eye, worst (cell {eye['worst_cell']})", f"{eye['worst']:.2f}")]
         rows += [("random eyes", f"{eye['eyes']} in each of {eye['cells']} cells")]
     return rows
+
+
+def wall_words() -> list[str]:
+    """What the shares of `Faces.walls_m2` are of."""
+    near = [f"{low + 1} to {high} grid steps off" for low, high in pairwise(BANDS)]
+    return ["exactly along an axis", *near, f"over {BANDS[-1]} off", "oblique or curved"]
+
+
+def face_rows(faces: "Faces") -> list[tuple[str, str]]:
+    """Faces of occluders by how they stand, as names and values."""
+    rows = [
+        (f"{kind} faces", f"{count:,}, {100 * share:.1f} % of their area")
+        for kind, count, share in zip(KINDS, faces.counts, faces.shares, strict=True)
+    ]
+    rows.append(("non-axial elements, clusters", f"{faces.elements:,}, {faces.clusters:,}"))
+    walls = zip(wall_words(), faces.wall_shares, strict=True)
+    return rows + [(f"walls {word}", f"{100 * share:.1f} %") for word, share in walls]
 
 
 def _certificates(bake: "BakeFolder") -> str:

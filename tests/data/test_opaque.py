@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from viewcell.data.buildings.prisms import prism
 from viewcell.data.graph import OTHER_AXES
 from viewcell.data.opaque import decompose, opaque_planes, plane_rectangles
 
@@ -30,6 +31,14 @@ def inside_rectangles(rectangles, doubled):
     """How many rectangles hold each point."""
     low, high = 2 * rectangles[:, 0].astype(np.int64), 2 * rectangles[:, 1].astype(np.int64)
     return ((doubled[:, None] > low) & (doubled[:, None] < high)).all(axis=2).sum(axis=1)
+
+
+def pierced(hole, *, size=4096):
+    """Triangles of a square with a hole, and the square's corners."""
+    square = np.array([(0, 0), (size, 0), (size, size), (0, size)])
+    mesh = prism(square, [np.array(hole)], 0.0, 1.0)
+    flat = mesh.vertices[mesh.faces][(mesh.vertices[mesh.faces][:, :, 2] == 0).all(axis=1)]
+    return flat[:, :, :2].astype(np.int32)
 
 
 def axial_triangles(rng, count, size=20):
@@ -85,6 +94,14 @@ def test_oblique_outlines_are_never_exceeded(seed, count, size):
     assert area == np.prod(high - low, axis=1).sum()
     middles = low + high
     assert (inside_rectangles(rectangles, middles) == 1).all()
+
+
+def test_an_oblique_edge_drops_nothing_beyond_its_ends():
+    """Beside the corner where the axial edge begins lies a raster cell that is as wide as the rest of the wall."""
+    hole = np.array([(1000, 1000), (2000, 1000), (2000, 2000), (1500, 2500), (1000, 2000)])
+    rectangles, _, _ = plane_rectangles(pierced(hole))
+    beside = np.array([[2 * 2001, 2 * 2001], [2 * 999, 2 * 2001], [2 * 1500, 2 * 2501]])
+    assert inside_rectangles(rectangles, beside).tolist() == [1, 1, 1]
 
 
 def test_most_of_a_gable_is_kept():
@@ -143,3 +160,72 @@ def test_decompose_tiles_the_mask(seed):
     us, vs = (np.cumsum(rng.integers(1, 5, n + 1)) for n in mask.shape)
     doubled, _ = raster(us, vs)
     np.testing.assert_array_equal(inside_rectangles(decompose(mask, us, vs), doubled), mask.ravel().astype(int))
+
+
+def arched(width, rise):
+    """Corners of a window with a round top, whose curve takes the upper `rise`."""
+    turn = np.linspace(0, np.pi, 13)
+    top = np.round(np.column_stack([1000 + (np.cos(turn) + 1) * width / 2, 2000 + np.sin(turn) * rise]))
+    return np.concatenate([[[1000, 500], [1000 + width, 500]], top])
+
+
+ROUND = np.round(
+    2000 + 800 * np.column_stack([f(np.linspace(0, 2 * np.pi, 24, endpoint=False)) for f in (np.cos, np.sin)])
+)
+
+
+@pytest.mark.parametrize("hole", [arched(1500, 750), ROUND, [(500, 500), (3000, 500), (3500, 1000), (3000, 1500)]])
+def test_what_is_carved_leaves_a_rectangle_open(hole):
+    """Four rectangles about the box of the hole: no more is left out than that box, and no less."""
+    hole = np.array(hole)
+    triangles = pierced(hole)
+    rectangles, area, lost = plane_rectangles(triangles, carve_area=2**21)
+    low, high = hole.min(axis=0).astype(int), hole.max(axis=0).astype(int)
+    assert len(rectangles) == 4 and area == 4096**2 - (high - low).prod()
+    assert area + lost == sum(plane_rectangles(triangles)[1:])
+    assert not ((rectangles[:, 0] < high).all(axis=1) & (rectangles[:, 1] > low).all(axis=1)).any()
+    assert len(plane_rectangles(triangles)[0]) > 12
+
+
+@pytest.mark.parametrize(
+    ("hole", "carve_area"),
+    [(arched(1500, 750), 1000), ([(500, 500), (2500, 500), (2500, 1500), (500, 2500)], 600_000)],
+)
+def test_a_part_that_would_lose_much_keeps_its_staircase(hole, carve_area):
+    """The box around the arch is too large; that of the slanted edge is not, but half of it is opaque."""
+    triangles = pierced(hole)
+    rectangles, area, lost = plane_rectangles(triangles, carve_area=carve_area)
+    whole = plane_rectangles(triangles)
+    np.testing.assert_array_equal(rectangles, whole[0])
+    assert (area, lost) == whole[1:]
+
+
+def test_under_a_pillar_nothing_is_carved():
+    """A round pillar's foot lies on a floor that covers it all."""
+    square = np.array([[(0, 0), (4096, 0), (4096, 4096)], [(0, 0), (4096, 4096), (0, 4096)]], np.int32)
+    fan = [(ROUND[0], ROUND[k], ROUND[k + 1]) for k in range(1, len(ROUND) - 1)]
+    triangles = np.concatenate([square, np.array(fan).astype(np.int32)])
+    assert plane_rectangles(triangles, carve_area=2**22)[1] == plane_rectangles(triangles)[1] > 0.9 * 4096**2
+
+
+@given(st.integers(0, 2**32), st.integers(1, 5), st.sampled_from([20, 3000]), st.sampled_from([100, 2**20]))
+def test_what_is_carved_is_less_than_what_is_opaque(seed, count, size, carve_area):
+    rng = np.random.default_rng(seed)
+    triangles = np.concatenate([rng.integers(0, size, (count, 3, 2)).astype(np.int32), axial_triangles(rng, 2, size)])
+    a, b = (triangles[:, k] - triangles[:, 0] for k in (1, 2))
+    triangles = triangles[a[:, 0] * b[:, 1] != a[:, 1] * b[:, 0]]
+    carved, area, lost = plane_rectangles(triangles, carve_area=carve_area)
+    whole, kept, dropped = plane_rectangles(triangles)
+    assert area <= kept and area + lost == kept + dropped
+    # Middles of the raster that both are made of lie in no rectangle of the one without lying in one of the other.
+    us, vs = (np.unique(np.concatenate([r[:, :, c].ravel() for r in (carved, whole)])).astype(np.int64) for c in (0, 1))
+    doubled, _ = raster(us, vs)
+    assert (inside_rectangles(carved, doubled) <= inside_rectangles(whole, doubled)).all()
+
+
+def test_levels_are_never_carved():
+    flat = pierced(ROUND)
+    for axis in range(3):
+        triangles = np.zeros((len(flat), 3, 3), np.int32)
+        triangles[:, :, OTHER_AXES[axis]] = flat
+        assert (len(opaque_planes(triangles, carve_area=2**20).boxes[axis]) == 4) == (axis < 2)

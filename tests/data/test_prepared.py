@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from builders import random_solids, small_house
 from viewcell.data import prepared
+from viewcell.data.buildings.arcade import ARCH_M, BAY_M, SPRING_M, make_arcade
+from viewcell.data.buildings.shell import OUTER_WALL_M
 from viewcell.data.prepared import PreparedModel, no_patches, no_regions
 from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
 from viewcell.verify.proofs.opaque import bounds_disc
@@ -54,7 +56,7 @@ def test_every_part_is_made_once(monkeypatch):
             model.occludees,
         )
     assert sorted(made) == sorted(
-        ["closed_elements", "opaque_planes", "opaque_planes", "find_regions", "find_patches", "find_occludees"]
+        ["closed_elements", *["opaque_planes"] * 3, "find_regions", "find_patches", "find_occludees"]
     )
 
 
@@ -84,6 +86,23 @@ def test_furniture_blocks_if_it_is_large_and_cuts_nothing():
     for boxes in model.blocking_planes.boxes:
         axis = int((boxes[:, 0] == boxes[:, 1]).all(axis=0).argmax()) if len(boxes) else 0
         assert (np.diff(boxes[:, 0, axis]) >= 0).all(), "ordered by plane, as the index wants them"
+
+
+def test_an_arch_is_carved_from_what_cuts_and_stays_in_what_blocks():
+    model = PreparedModel(make_arcade(windows=1, furnished=False))
+    low, high = (round((OUTER_WALL_M + (BAY_M + side * ARCH_M) / 2) / GRID_M) for side in (-1, 1))
+    above = np.array([[low, round(SPRING_M / GRID_M)], [high, round((SPRING_M + ARCH_M / 2) / GRID_M)]])
+
+    def in_the_arch(planes):
+        """Rectangles of the wall's front that reach into the box around the arch."""
+        return [r for r in planes.index.rectangles(1, 0) if (r[0] < above[1]).all() and (r[1] > above[0]).all()]
+
+    assert len(in_the_arch(model.surfaces)) > 4 and not in_the_arch(model.planes)
+    blocks = {rectangle.tobytes() for rectangle in in_the_arch(model.blocking_planes)}
+    assert blocks == {rectangle.tobytes() for rectangle in in_the_arch(model.surfaces)}
+    # The rest of the wall is as it was.
+    carved = model.surfaces.axial_area - model.surfaces.lost_area - (model.planes.axial_area - model.planes.lost_area)
+    assert 0 < carved * GRID_M**2 < 4.0
 
 
 def test_outlines_are_the_rectangles_of_regions_then_the_patches():

@@ -137,7 +137,7 @@ def test_what_cannot_be_covered_is_told():
     assert "0.15 m thin" in covered(flat)[1].why or covered(flat)[1].covered
     mesh = ROOMS["box"]
     floorless = Space("open", np.array(mesh.vertices), np.array(mesh.faces[mesh.face_normals[:, 2] > -0.5], np.int32))
-    assert covered(floorless)[1].why == "its body holds no point, or is not closed"
+    assert covered(floorless)[1].why == "its body is not closed"
 
 
 def test_a_room_that_its_cells_cover_gets_no_others():

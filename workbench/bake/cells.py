@@ -199,6 +199,7 @@ def build_graph(model: PreparedModel, settings: Settings, clock: Clock) -> tuple
         "leak_cells": inhabited.leak,
         "dead_cells": int(dead.sum()),
         "axial_area_m2": round(opaque.axial_area * scene.grid_m**2, 3),
-        "axial_area_lost_m2": round(opaque.lost_area * scene.grid_m**2, 3),
+        "axial_area_lost_m2": round(model.surfaces.lost_area * scene.grid_m**2, 3),
+        "axial_area_carved_m2": round((opaque.lost_area - model.surfaces.lost_area) * scene.grid_m**2, 3),
     }
     return graph, notes

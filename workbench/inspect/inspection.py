@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from ...data.carving import Faces
 from ...data.scene import Scene
 from .cells import Cells
 from .surfaces import Directions, Surfaces
@@ -32,6 +33,7 @@ class Inspection:
         stray: names of parts far away from the others, and their distance [m].
         surfaces: faults of surfaces.
         directions: of upright faces; None if there are none.
+        faces: of occluders, by how they stand to the axes.
         cells: what a bake would find.
         differences: what a second reader found otherwise, one line each; None where none was asked.
         warnings: what is wrong.
@@ -46,6 +48,7 @@ class Inspection:
     stray: list[tuple[str, float]]
     surfaces: Surfaces
     directions: Directions | None
+    faces: Faces
     cells: Cells
     differences: list[str] | None = None
     warnings: list[Warning] = field(default_factory=list)
@@ -80,6 +83,7 @@ class Inspection:
             "directions": None
             if self.directions is None
             else asdict(self.directions) | {"other": self.directions.other},
+            "faces": asdict(self.faces),
             "surfaces": self._surfaces(),
             "stray": [{"name": name, "distance_m": distance} for name, distance in self.stray],
             "cells": {"cells": count, "inhabitable": inhabitable, "portals": portals, "because": cells.because},

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...data.carving import find_faces
 from ...data.errors import InputError
 from ...data.prepared import PreparedModel
 from ...data.scene import Scene
@@ -52,6 +53,7 @@ def inspect(
         stray=_stray(scene),
         surfaces=find_surfaces(prepared),
         directions=find_directions(scene),
+        faces=find_faces(scene),
         cells=find_cells(prepared, **({} if estimate else {"tried": 0})),
     )
     if referee:

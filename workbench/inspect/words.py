@@ -6,6 +6,7 @@ from textwrap import wrap
 
 from ...data.scene import Role
 from ...verify.check_result import counted
+from ..summary import KINDS, wall_words
 from .cells import CRACKS_M
 from .inspection import Inspection, Warning
 
@@ -41,6 +42,8 @@ def lines(found: Inspection) -> list[str]:
         ("glass, doors", _counted(found.told, TOLD_SHOWN) or "none"),
         ("rooms", _rooms(found)),
         ("walls run", _directions(found)),
+        ("walls stand", _walls_stand(found)),
+        ("faces", _faces(found)),
         ("surfaces", _surfaces(found)),
         ("doubled", _doubled(found)),
         ("cells", f"{count:,}, {inhabitable:,} of them to stand in ({cells.because}); {portals:,} portals"
@@ -110,6 +113,21 @@ def _directions(found: Inspection) -> str:
         off = min(ways.yaw_deg, 90.0 - ways.yaw_deg)
         turn = "less than a degree off that" if off <= NEARLY_DEG else f"turned by about {ways.yaw_deg:g} degrees"
         text += f", {100 * ways.yaw:.1f} % {turn}, {100 * ways.other:.1f} % otherwise"
+    return text
+
+
+def _walls_stand(found: Inspection) -> str:
+    shares = zip(wall_words(), found.faces.wall_shares, strict=True)
+    text = ", ".join(f"{100 * share:.1f} % {word}" for word, share in shares if share > 0)
+    return text or "nothing upright occludes"
+
+
+def _faces(found: Inspection) -> str:
+    faces = found.faces
+    kinds = zip(KINDS, faces.counts, faces.shares, strict=True)
+    text = ", ".join(f"{count:,} {kind} ({100 * share:.1f} %)" for kind, count, share in kinds)
+    if faces.elements:
+        text += f"; {counted(faces.elements, 'non-axial element')} in {counted(faces.clusters, 'cluster')}"
     return text
 
 

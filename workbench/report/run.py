@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...data.carving import find_faces
 from ...data.errors import InputError
 from ...data.prepared import PreparedModel
 from ...data.scene import OPAQUE
@@ -15,7 +16,7 @@ from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses, visible_rows
 from ..bake.worth import told_worth
 from ..curves.series import read_curves
-from ..summary import kept_rows
+from ..summary import face_rows, kept_rows
 from .plans import Painter, Section, Storey, find_storeys, plan_of
 from .web_page import page
 
@@ -289,6 +290,9 @@ def _numbers(bake: "BakeFolder", kept: dict | None) -> list[str]:
     ]
     for c in count_pairs(bake):
         lines.append(f"| {c.name} | {' | '.join(c.columns())} |")
+    if bake.scene is not None:
+        found = face_rows(find_faces(bake.scene))
+        lines += ["", "| faces of occluders | |", "|---|---|", *(f"| {name} | {value} |" for name, value in found)]
     if kept is not None:
         lines += ["", "| kept | |", "|---|---|", *(f"| {name} | {value} |" for name, value in kept_rows(kept))]
     seconds = {k: v for k, v in bake.manifest.get("seconds", {}).items() if isinstance(v, int | float)}

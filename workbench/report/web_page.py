@@ -17,11 +17,12 @@ import numpy as np
 import pyarrow as pa
 
 from ... import __version__
+from ...data.carving import find_faces
 from ...data.scene import Role
 from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses
 from ..bake.worth import told_worth
-from ..summary import kept_rows
+from ..summary import face_rows, kept_rows
 from .modules import join_modules
 from .plans import Storey, find_storeys, plan_of, section_lines
 
@@ -159,6 +160,7 @@ def _facts(bake: "BakeFolder", told: tuple[dict | None, list[str]]) -> dict:
         "skippedCount": len(skipped),
         "warnings": warnings,
         "kept": [] if kept is None else [list(row) for row in kept_rows(kept)],
+        "faces": [] if bake.scene is None else [list(row) for row in face_rows(find_faces(bake.scene))],
         "classes": [[c.name, *c.columns()] for c in count_pairs(bake)],
     }
 

@@ -37,7 +37,7 @@ class Office:
         patches = find_patches(self.triangles, self.owners, least_area=0.2 * STEPS**2)
         # Without rectangles of furniture: few occluders, so that where a projection point lies matters.
         solids = ([corners for _, corners in model.closed_of(role)] for role in OPAQUE)
-        regions = find_regions(model.planes, *solids, scene.grid_m)
+        regions = find_regions(model.surfaces, *solids, scene.grid_m)
         self.occluders = join_outlines(rectangle_outlines(regions.boxes), patches)
         self.parts, self.count = model.occludees.pieces, len(scene.objects)
         self.part_owners = model.occludees.owners

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from builders import random_solids
 from viewcell.data import readers
+from viewcell.data.buildings.arcade import make_arcade
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.store.scene_folder import write_scene
@@ -41,6 +42,19 @@ def test_a_fault_has_its_price_and_its_cure():
     (crack,) = [warning for warning in found.warnings if "crack" in warning.what]
     assert "16 mm by 4.0 m" in crack.what and "--seal" in crack.do and crack.costs
     assert "not tried" in found.text() and crack.do.split()[0] in found.text()
+
+
+def test_how_faces_stand_is_told():
+    """The arcade's are as the paper's; one wall of another scene misses its axis by two steps."""
+    arcade = inspect(make_arcade(furnished=False), estimate=False)
+    assert "118 non-axial" in arcade.text() and "9 non-axial elements in 9 clusters" in " ".join(arcade.text().split())
+    assert arcade.json()["faces"]["counts"][1:] == (0, 118)
+    house = two_rooms()
+    house.definitions[6].lods[0].vertices[4:, 1] += (
+        2 * house.grid_m * (house.definitions[6].lods[0].vertices[4:, 0] > 4)
+    )
+    found = inspect(house, estimate=False)
+    assert "% 1 to 3 grid steps off" in found.text() and found.json()["faces"]["walls_m2"][1] > 0
 
 
 def test_what_lies_far_away_is_named():

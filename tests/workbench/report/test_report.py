@@ -39,6 +39,8 @@ def test_report_of_the_house(house, tmp_path):
     assert path == tmp_path / "looks" / "report.md"
     assert "| cells, inhabitable | 14 | 14 | 1.000 | 0.00 % |" in text
     assert "| opaque triangles | 216 |" in text and "| flood | 0.10 |" in text
+    assert "| walls exactly along an axis | 100.0 % |" in text and "| non-axial elements, clusters | 0, 0 |" in text
+    assert '["walls exactly along an axis","100.0 %"]' in path.with_name("report.html").read_text()
     pictures = [line.partition("](")[2].rstrip(")") for line in text.splitlines() if line.startswith("![")]
     assert len(pictures) == 1 + len(choose_cells(house))
     assert sorted([*pictures, "report.html", "report.md"]) == sorted(p.name for p in path.parent.iterdir())

@@ -41,7 +41,7 @@ def office() -> Scene:
 def prepared(scene: Scene) -> PreparedModel:
     """A model whose furniture hides by its sections alone: as in 0.1.0, so that times compare."""
     model = PreparedModel(scene)
-    model.blocking_planes = model.planes
+    model.blocking_planes = model.surfaces
     return model
 
 

@@ -25,6 +25,7 @@ export function factTables(facts) {
       head: ["targets", "potential", "seen", "unknown", "overestimate"],
     },
     ...(facts.kept.length ? [{ title: "Kept by a view cell", rows: facts.kept }] : []),
+    ...(facts.faces.length ? [{ title: "Faces of occluders", rows: facts.faces }] : []),
     { title: "Counts", rows: named(facts.counts, count) },
     ...(seconds.length > 1 ? [{ title: "Seconds by phase", rows: seconds }] : []),
     { title: "Settings", rows: named(facts.settings, (v) => v || "default") },

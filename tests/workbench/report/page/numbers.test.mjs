@@ -13,6 +13,7 @@ const FACTS = {
   snapMetres: null,
   because: "",
   sha256: "",
+  faces: [["axial faces", "9, 75.0 % of their area"]],
   kept: [["objects, mean by volume", "11.1 %"]],
 };
 
@@ -21,6 +22,7 @@ test("the manifest's numbers are tables", () => {
   assert.deepEqual(tables, {
     "Seen from all view cells": [["objects", "9", "6", "3", "1.500"]],
     "Kept by a view cell": [["objects, mean by volume", "11.1 %"]],
+    "Faces of occluders": [["axial faces", "9, 75.0 % of their area"]],
     Counts: [["cell pairs", "12,345"]],
     "Seconds by phase": [
       ["flood", "1.00"],
@@ -37,7 +39,7 @@ test("the manifest's numbers are tables", () => {
       ["origin", "(1, 2, 3) m"],
     ],
   });
-  const full = factTables({ ...FACTS, kept: [], seconds: {}, snapMetres: 0.0005, because: "rooms", sha256: "ab" });
+  const full = factTables({ ...FACTS, kept: [], faces: [], seconds: {}, snapMetres: 0.0005, because: "rooms", sha256: "ab" });
   assert.deepEqual(
     full.map(({ title }) => title),
     ["Seen from all view cells", "Counts", "Settings", "Model"],
