@@ -353,10 +353,10 @@ def _many(values: tuple) -> str:
 
 HEAD = """# The papers' tables beside ours
 
-Made by `python -m viewcell.workbench.bench papers` at commit {commit}. Scenes are synthetic stand-ins of the published \
-ones (`viewcell make office --like soda-hall`, `viewcell make plant`, `viewcell make arcade`), machines up to thirty \
-years apart: counts compare, seconds tell the distance only. A dash is what this software cannot measure, or a paper \
-does not say.
+Made by `python -m viewcell.workbench.bench papers` at commit {commit}. Scenes are synthetic stand-ins of the \
+published ones (`viewcell make office --like soda-hall`, `viewcell make plant`, `viewcell make arcade`), \
+machines up to thirty years apart: counts compare, seconds tell the distance only. A dash is what this \
+software cannot measure, or a paper does not say.
 """
 
 

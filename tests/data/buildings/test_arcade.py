@@ -1,10 +1,12 @@
 import numpy as np
 import pytest
 from builders.closed import assert_closed, assert_rooms_are_clear, assert_sealed
+from viewcell.data import prepared
 from viewcell.data.buildings.arcade import arch, make_arcade, octagon
 from viewcell.data.errors import InputError
 from viewcell.data.scene import Role
 from viewcell.workbench.bake.run import bake
+from viewcell.workbench.verify import verify_bake
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +75,20 @@ def test_plants_of_the_court_are_seen_through_the_arches(arcade, tmp_path):
     # Through a door, the corridor and an arch, and through the octagon.
     assert any(room.endswith("office") and "of the court" in name for room, name in seen)
     assert ("hall", "west wall") in seen
+
+
+def test_what_is_carved_hides_nothing_and_keeps_no_more(tmp_path, monkeypatch):
+    """Half the portals, the same cells and the same sets, and no ray sees what they leave out."""
+    scene = make_arcade(windows=2)
+    carved = bake(scene, tmp_path / "carved", threads=1)
+    monkeypatch.setattr(prepared, "CARVED_M2", 0.0)
+    whole = bake(scene, tmp_path / "whole", threads=1)
+    assert carved.manifest["axial_area_carved_m2"] > 0.4 and whole.manifest["axial_area_carved_m2"] == 0.0
+    assert carved.graph.portal_count < 0.6 * whole.graph.portal_count
+    np.testing.assert_array_equal(carved.graph.cells, whole.graph.cells)
+    np.testing.assert_array_equal(carved.potential_objects, whole.potential_objects)
+    found = verify_bake(carved, rays=200_000)
+    assert found.ok
 
 
 @pytest.mark.parametrize("segments", range(2, 66, 2))
