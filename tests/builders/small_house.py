@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 from viewcell.data.graph import CellGraph
 from viewcell.data.scene import Definition, Instance, Mesh, Role, Scene
+from viewcell.data.store.bake_folder import BakeFolder
 from viewcell.data.verdict import Verdict
 from viewcell.verify.exact.stab import stab
 
@@ -34,6 +35,8 @@ class StandIn:
     potential_objects: np.ndarray
     cracks: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3), np.int32))
     claims_cells: bool = True
+    in_model = BakeFolder.in_model
+    yaw_deg: float = 0.0
 
 
 def small_graph() -> CellGraph:

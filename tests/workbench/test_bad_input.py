@@ -167,7 +167,7 @@ def other_ids(folder):
 
 
 BAKES = {
-    "other version": (edit(format=2), "expected format 1, found 2"),
+    "other version": (edit(format=3), "expected format 1 or 2, found 3"),
     "unfinished": (edit(complete=False), "expected complete True, found False"),
     "a scene": (edit(kind="scene"), "expected kind 'bake', found 'scene'"),
     "no grid": (edit(grid_m=None), "'grid_m'"),

@@ -156,7 +156,8 @@ def read_case(path: str | Path) -> WrongHidden:
         if fields.pop("format", None) != "viewcell-case-1":
             raise ValueError
         vectors = {name: tuple(float(c) for c in fields.pop(name)) for name in ("origin", "direction")}
-        case = WrongHidden(**fields, **vectors)
+        line = tuple(tuple(float(c) for c in end) for end in fields.pop("model_line", ()))
+        case = WrongHidden(**fields, **vectors, model_line=line)
         numbers = np.array([case.origin, case.direction])
         if case.kind not in ("cell", "object") or numbers.shape != (2, 3) or not np.isfinite(numbers).all():
             raise ValueError

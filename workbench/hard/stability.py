@@ -116,7 +116,8 @@ def _sweeps(cases: int, seed: int) -> Iterator[tuple[str, float, HardCases]]:
         yield "distance from an edge, grid steps", value, HardCases(stab=[], region=[], sightline=lines, **NOTHING)
 
 
-NOTHING: dict[str, list] = {"shadow": [], "coverage": [], "backface": [], "graph": [], "model": [], "knapsack": []}
+KINDS = ("shadow", "oblique", "coverage", "backface", "graph", "model", "knapsack")
+NOTHING: dict[str, list] = {kind: [] for kind in KINDS}
 
 
 def stab_case(random: np.random.Generator, gap: int, offset: int, number: int) -> StabCase:

@@ -101,7 +101,9 @@ class _Maze:
         else:
             self.pairs, self.doors = _touching(self.cells)
             self.axes = np.argmin(self.doors[:, 1] - self.doors[:, 0], axis=1)
-        self.stands = np.flatnonzero(self.inhabitable)
+        # Paths lead through the cells that tile space; prisms lie over them. Without such cells they are all there is.
+        tiles = np.flatnonzero(self.inhabitable[: graph.tile_count])
+        self.stands = tiles if len(tiles) else np.flatnonzero(self.inhabitable)
         if not len(self.stands):
             raise InputError(f"{bake.folder}: expected at least one inhabitable cell, found none")
         self._join()
@@ -227,6 +229,7 @@ def potential_on(bake: BakeFolder, path: CameraPath) -> tuple[np.ndarray, np.nda
     lost = np.zeros(len(path), bool)
     for frame, eye in enumerate(eyes):
         holding = stands[(boxes[:, 0] <= eye).all(axis=1) & (eye <= boxes[:, 1]).all(axis=1)]
+        holding = holding[bake.graph.plans.hold(holding, np.tile(eye, (len(holding), 1)), bake.graph.cell_count)]
         lost[frame] = not len(holding)
         sets[frame] = bake.potential_objects[holding].any(axis=0) if len(holding) else True
     return sets, lost
