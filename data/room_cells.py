@@ -60,6 +60,11 @@ class RoomCover:
         """Whether it is enough."""
         return self.share >= COVERED_SHARE
 
+    @property
+    def entry(self) -> dict:
+        """What the manifest says of it under `rooms`; only a room that is not covered has a `why`."""
+        return {"name": self.name, "covered": round(self.share, 4), **({"why": self.why} if self.why else {})}
+
 
 def room_name(space: Space) -> str:
     """What its cells are called."""

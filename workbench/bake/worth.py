@@ -9,7 +9,7 @@ from ...data.graph import CellGraph
 from ...data.kept import kept_shares, mean_kept
 from ...data.leaks import cells_behind_cracks
 from ...data.prepared import PreparedModel
-from ...data.room_cells import RoomCover, room_covers
+from ...data.room_cells import room_covers
 
 if TYPE_CHECKING:
     from ...data.store.bake_folder import BakeFolder
@@ -45,12 +45,8 @@ def worth(
     leaky = rooms = 0
     if model is not None:
         found["kept"] = kept_numbers(model, graph, pairs, seed)
-        spaces = model.scene.spaces
-        # Whoever gives view cells knows where they are not.
-        uncovered = []
-        if facts.get("inhabitable_because") not in ("given", "octree"):
-            uncovered = [room for room in room_covers(model.scene, graph, model.closed) if not room.covered]
-        found["uncovered_rooms"], rooms = [room.name for room in uncovered], len(spaces)
+        spaces, uncovered = model.scene.spaces, _uncovered_rooms(model, graph, facts)
+        found["uncovered_rooms"], rooms = [room["name"] for room in uncovered], len(spaces)
         if spaces and graph.portal_count:
             leaky = int(cells_behind_cracks(model.scene, graph, CRACK_M).sum())
         warnings += _kept_words(found["kept"], _first_to_do(facts, bool(budget), bool(leak) or leaky > 0))
@@ -94,6 +90,15 @@ def kept_numbers(model: PreparedModel, graph: CellGraph, pairs: tuple[np.ndarray
     return {"objects": objects, "triangles": triangles, "eye": eye}
 
 
+def _uncovered_rooms(model: PreparedModel, graph: CellGraph, facts: dict) -> list[dict]:
+    """Rooms that view cells do not cover, as the manifest has them under `rooms`; found now if it has none."""
+    rooms = facts.get("rooms")
+    # Whoever gives view cells knows where they are not.
+    if rooms is None and facts.get("inhabitable_because") not in ("given", "octree"):
+        rooms = [cover.entry for cover in room_covers(model.scene, graph, model.closed)]
+    return [room for room in rooms or [] if "why" in room]
+
+
 def _first_to_do(facts: dict, budget: bool, leak: bool) -> str:
     """What is likeliest to make cells keep less."""
     if budget:
@@ -117,10 +122,11 @@ def _kept_words(kept: dict, do: str) -> list[str]:
     return [f"a view cell keeps {100 * kept[name]:.0f} % of the {name} on average, so little is culled; {do}"]
 
 
-def _room_words(uncovered: list[RoomCover], rooms: int) -> list[str]:
+def _room_words(uncovered: list[dict], rooms: int) -> list[str]:
     if not uncovered:
         return []
-    named = ", ".join(f"{room.name!r} ({100 * room.share:.0f} %: {room.why})" for room in uncovered[:ROOMS_NAMED])
+    shown = uncovered[:ROOMS_NAMED]
+    named = ", ".join(f"{room['name']!r} ({100 * room['covered']:.0f} %: {room['why']})" for room in shown)
     more = f" and {len(uncovered) - ROOMS_NAMED:,} more" if len(uncovered) > ROOMS_NAMED else ""
     verb = "is" if len(uncovered) == 1 else "are"
     return [
