@@ -17,7 +17,7 @@ from .opaque import NO_PLANES, OpaquePlanes, opaque_planes
 from .patches import Patches, find_patches, join_outlines, rectangle_outlines
 from .regions import Regions, find_regions
 from .scene import OPAQUE, Role, Scene
-from .skewed import with_sections
+from .skewed import find_sections, with_sections
 from .solids import closed_elements
 
 # Smaller pieces of furniture hide little and would fill the hierarchy of blockers.
@@ -56,16 +56,18 @@ class PreparedModel:
     @cached_property
     def surfaces(self) -> OpaquePlanes:
         """Opaque rectangles of occluders, on faces and inside walls that are nearly axial."""
-        return self._with_sections(opaque_planes(self.scene.triangles(Role.OCCLUDER)[0]))
+        return with_sections(opaque_planes(self.scene.triangles(Role.OCCLUDER)[0]), self.sections)
 
     @cached_property
     def planes(self) -> OpaquePlanes:
         """Those that cut cells: with oblique details carved out, so that arches leave rectangles open."""
         carved = opaque_planes(self.scene.triangles(Role.OCCLUDER)[0], carve_area=CARVED_M2 / self.scene.grid_m**2)
-        return self._with_sections(carved)
+        return with_sections(carved, self.sections)
 
-    def _with_sections(self, faces: OpaquePlanes) -> OpaquePlanes:
-        return with_sections(faces, [t for _, t in self.closed_of(Role.OCCLUDER)], self.scene.grid_m)
+    @cached_property
+    def sections(self) -> list[np.ndarray]:
+        """Opaque rectangles inside closed occluders that are nearly axial: flat boxes of each axis."""
+        return find_sections([t for _, t in self.closed_of(Role.OCCLUDER)], self.scene.grid_m)
 
     @cached_property
     def blocking_planes(self) -> OpaquePlanes:

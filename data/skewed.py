@@ -21,23 +21,30 @@ SLIVER = 64
 LEAST_M2 = 1.0
 
 
-def with_sections(planes: OpaquePlanes, elements: list[np.ndarray], grid_m: float) -> OpaquePlanes:
-    """Opaque planes, and sections of walls that stand nearly along an axis.
+def find_sections(elements: list[np.ndarray], grid_m: float) -> list[np.ndarray]:
+    """Sections of walls that stand nearly along an axis.
 
     Args:
-        planes: of the axial faces.
         elements: triangles of each closed opaque element [grid steps], shape (m, 3, 3), int32.
         grid_m: grid step [m].
+
+    Returns:
+        Flat boxes of each axis, shape (n, 2, 3), int32.
     """
     least = LEAST_M2 / grid_m**2
-    boxes: list[list[np.ndarray]] = [[part] for part in planes.boxes]
+    boxes: list[list[np.ndarray]] = [[np.zeros((0, 2, 3), np.int32)] for _ in range(3)]
     for triangles in elements:
         for axis in (0, 1):
             for plane in _between_faces(triangles, axis, least):
                 boxes[axis].append(_section(triangles, axis, plane, least))
-    joined = [np.concatenate(parts) for parts in boxes]
-    if all(len(new) == len(old) for new, old in zip(joined, planes.boxes, strict=True)):
+    return [np.concatenate(parts) for parts in boxes]
+
+
+def with_sections(planes: OpaquePlanes, sections: list[np.ndarray]) -> OpaquePlanes:
+    """Opaque planes of axial faces, and sections of walls; the very same planes if there are none."""
+    if not any(len(part) for part in sections):
         return planes
+    joined = [np.concatenate(parts) for parts in zip(planes.boxes, sections, strict=True)]
     ordered = [part[np.argsort(part[:, 0, axis], kind="stable")] for axis, part in enumerate(joined)]
     return OpaquePlanes(ordered, planes.axial_area, planes.lost_area, SLIVER)
 

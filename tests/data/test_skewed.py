@@ -27,8 +27,7 @@ def wall_of(length, thick, deg, height=3.0, doors=()):
 
 
 def sections(scene):
-    model = PreparedModel(scene)
-    return with_sections(NO_PLANES, [t for _, t in model.closed_of(Role.OCCLUDER)], GRID_M)
+    return with_sections(NO_PLANES, PreparedModel(scene).sections)
 
 
 @pytest.mark.parametrize("deg", [0.01, 0.15, -0.3, 1.0])
