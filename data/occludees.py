@@ -14,7 +14,7 @@ import numpy as np
 from .frame import wall_yaw
 from .hierarchy import build_levels
 from .incidence import CHUNK, clip_bounds
-from .plans import Plans
+from .plans import Plans, are_convex, box_corners, plan_bounds, turned_plan
 from .ragged import owners_of, places_of
 from .scene import Scene, turned
 
@@ -92,7 +92,7 @@ def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, Plans, np.nda
     boxes, owner = boxes[~tighter[owner]], owner[~tighter[owner]]
     corners, oblique = corners[tighter[oblique]], oblique[tighter[oblique]]
     around = np.full((len(corners), 2, 3), 0)
-    around[:, 0, :2], around[:, 1, :2] = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
+    around[:, :, :2] = plan_bounds(corners[:, :, :2])
     around[:, 0, 2], around[:, 1, 2] = corners[:, 0, 2], corners[:, 2, 2]
     place = np.concatenate([np.full(len(boxes), -1), np.arange(len(corners))])
     boxes, owner = np.concatenate([boxes, around]), np.concatenate([owner, oblique])
@@ -142,25 +142,22 @@ def _tight_plan(triangles: np.ndarray, box: np.ndarray, yaw_deg: float) -> np.nd
     Its corners are those of the object where it has some there: what is a step larger sticks out of the wall that the
     object ends in.
     """
-    x, y = (box[:, axis] + np.array([-ROUNDING, ROUNDING]) for axis in (0, 1))
-    frame = np.column_stack([x[[0, 1, 1, 0]], y[[0, 0, 1, 1]], box[[0, 0, 1, 1], 2]])
-    wide = np.round(turned(frame.astype(float), yaw_deg)).astype(np.int64)
+    frame = box_corners(box + np.array([[-ROUNDING], [ROUNDING]]))
+    wide = np.round(turned_plan(frame.astype(float), yaw_deg)).astype(np.int64)
     vertices = np.unique(triangles.reshape(-1, 3)[:, :2], axis=0)
     points = _plan_points(triangles, box[:, :2] + np.array([[-1], [1]]), yaw_deg)
-    away = np.abs(vertices[None] - wide[:, None, :2]).max(axis=2)
+    away = np.abs(vertices[None] - wide[:, None]).max(axis=2)
     nearest = away.argmin(axis=1)
     tight = away.min(axis=1) <= 2 * ROUNDING + 1
     for chosen in (tight & np.array(some) for some in FEWER_CORNERS):
-        plan = np.where(chosen[:, None], vertices[nearest], wide[:, :2])
-        along = np.roll(plan, -1, axis=0) - plan
-        bend = np.roll(along, -1, axis=0)
-        if (along[:, 0] * bend[:, 1] <= along[:, 1] * bend[:, 0]).any():
+        plan = np.where(chosen[:, None], vertices[nearest], wide)
+        if not are_convex(plan):
             continue
-        rest = points[:, None] - plan
+        along, rest = np.roll(plan, -1, axis=0) - plan, points[:, None] - plan
         inward = along[:, 0] * rest[:, :, 1] - along[:, 1] * rest[:, :, 0]
         if (inward >= -1e-6 * np.abs(along).sum(axis=1)).all():
             break
-    return np.column_stack([plan, wide[:, 2]])
+    return np.column_stack([plan, box[[0, 0, 1, 1], 2]])
 
 
 def _plan_points(triangles: np.ndarray, rectangle: np.ndarray, yaw_deg: float) -> np.ndarray:
@@ -181,18 +178,13 @@ def _plan_points(triangles: np.ndarray, rectangle: np.ndarray, yaw_deg: float) -
                 held = (share >= 0) & (share <= 1) & (point >= low - 1).all(axis=1) & (point <= high + 1).all(axis=1)
                 crossings.append(point[held])
     # Corners of the rectangle that a triangle lies under or over.
-    for corner in np.array([low, [high[0], low[1]], high, [low[0], high[1]]]):
+    for corner in box_corners(np.array([low, high])):
         edges = np.roll(flat, -1, axis=1) - flat
         rest = corner - flat
         turn = edges[:, :, 0] * rest[:, :, 1] - edges[:, :, 1] * rest[:, :, 0]
         if ((turn >= 0).all(axis=1) | (turn <= 0).all(axis=1)).any():
             crossings.append(corner[None])
-    return np.concatenate([own[inside], turned(_lifted(np.concatenate(crossings)), yaw_deg)[:, :2]])
-
-
-def _lifted(points: np.ndarray) -> np.ndarray:
-    """Plan points with a height of 0, shape (n, 3)."""
-    return np.column_stack([points, np.zeros(len(points))])
+    return np.concatenate([own[inside], turned_plan(np.concatenate(crossings), yaw_deg)])
 
 
 def _models(triangles: np.ndarray, owners: np.ndarray, bounds: np.ndarray) -> np.ndarray:

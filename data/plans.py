@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .scene import turned
+
 
 @dataclass(frozen=True)
 class Plans:
@@ -70,9 +72,7 @@ class Plans:
         """
         place, corners = self.places(count), np.empty((2, len(sources), 4, 2), np.int64)
         for side, rows in enumerate((sources, targets)):
-            low, high = boxes[rows, 0, :2].astype(np.int64), boxes[rows, 1, :2].astype(np.int64)
-            x, y = (np.stack([low[:, axis], high[:, axis]], axis=1) for axis in (0, 1))
-            corners[side] = np.stack([x[:, [0, 1, 1, 0]], y[:, [0, 0, 1, 1]]], axis=2)
+            corners[side] = box_corners(boxes[rows])
             planned = np.flatnonzero(place[rows] >= 0)
             corners[side, planned] = self.corners[place[rows[planned]]]
         parted = np.zeros(len(sources), bool)
@@ -93,3 +93,30 @@ class Plans:
 
 
 NO_PLANS = Plans(np.zeros(0, np.int64), np.zeros((0, 4, 2), np.int32))
+
+
+def box_corners(boxes: np.ndarray) -> np.ndarray:
+    """Corners of boxes in plan, counter-clockwise from the low one: (..., 2, 2 or 3) gives (..., 4, 2)."""
+    return np.stack([boxes[..., [0, 1, 1, 0], 0], boxes[..., [0, 0, 1, 1], 1]], axis=-1)
+
+
+def plan_bounds(corners: np.ndarray) -> np.ndarray:
+    """Rectangles around plans: (..., 4, 2) gives (..., 2, 2)."""
+    return np.stack([corners.min(axis=-2), corners.max(axis=-2)], axis=-2)
+
+
+def are_convex(corners: np.ndarray) -> np.ndarray:
+    """Whether plans, shape (..., 4, 2), are convex and counter-clockwise, without a straight corner; shape (...,)."""
+    along = np.roll(corners, -1, axis=-2) - corners
+    bend = np.roll(along, -1, axis=-2)
+    return (along[..., 0] * bend[..., 1] > along[..., 1] * bend[..., 0]).all(axis=-1)
+
+
+def turned_plan(points: np.ndarray, yaw_deg: float) -> np.ndarray:
+    """Points of a plan, shape (n, 2), turned counter-clockwise about the origin."""
+    return turned(np.column_stack([points, np.zeros(len(points))]), yaw_deg)[:, :2]
+
+
+def come_last(rows: np.ndarray, count: int) -> bool:
+    """Whether ascending rows are the last ones of so many."""
+    return np.array_equal(rows, np.arange(count - len(rows), count))

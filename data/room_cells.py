@@ -12,7 +12,7 @@ import numpy as np
 
 from .frame import wall_yaw
 from .graph import CellGraph
-from .plans import Plans
+from .plans import Plans, are_convex, box_corners, plan_bounds, turned_plan
 from .scene import Scene, Space, turned
 from .solids import SolidIndex, winding_numbers
 
@@ -230,15 +230,12 @@ def room_prisms(space: Space, grid_m: float) -> list[tuple[np.ndarray, np.ndarra
 
 def _prism(low: tuple, high: tuple, yaw_deg: float, grid_m: float) -> tuple[np.ndarray, np.ndarray] | None:
     """Box and plan of a box of a turned frame [m]; None if nothing is left of it on the grid."""
-    plan = np.array([[low[0], low[1], 0], [high[0], low[1], 0], [high[0], high[1], 0], [low[0], high[1], 0]], float)
-    corners = np.round(turned(plan, yaw_deg)[:, :2] / grid_m).astype(np.int64)
-    heights = np.round(np.array([low[2], high[2]]) / grid_m).astype(np.int64)
-    along = np.roll(corners, -1, axis=0) - corners
-    bend = np.roll(along, -1, axis=0)
-    if heights[0] >= heights[1] or (along[:, 0] * bend[:, 1] <= along[:, 1] * bend[:, 0]).any():
+    box = np.array([low, high], float)
+    corners = np.round(turned_plan(box_corners(box), yaw_deg) / grid_m).astype(np.int64)
+    heights = np.round(box[:, 2] / grid_m).astype(np.int64)
+    if heights[0] >= heights[1] or not are_convex(corners):
         return None
-    box = np.array([[*corners.min(axis=0), heights[0]], [*corners.max(axis=0), heights[1]]])
-    return box, corners
+    return np.column_stack([plan_bounds(corners), heights]), corners
 
 
 def _slices(level: Space) -> list[tuple[float, float, np.ndarray, np.ndarray, np.ndarray]]:

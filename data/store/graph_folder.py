@@ -7,7 +7,7 @@ import pyarrow as pa
 
 from ..errors import InputError
 from ..graph import OTHER_AXES, CellGraph
-from ..plans import NO_PLANS, Plans
+from ..plans import NO_PLANS, Plans, are_convex, come_last, plan_bounds
 from ..scene import GRID_LIMIT, GRID_M
 from .scene_folder import read_table
 
@@ -96,17 +96,15 @@ def _plans(table: pa.Table, cells: np.ndarray, grid_m: float, path: Path, order:
     rows = np.array([n for n, plan in enumerate(column) if plan is not None], np.int64)
     if not len(rows):
         return NO_PLANS
-    if not np.array_equal(rows, np.arange(len(cells) - len(rows), len(cells))):
+    if not come_last(rows, len(cells)):
         raise InputError(f"{path}: expected cells with a plan after all others, found one before cell {rows[0] + 1}")
     try:
         metres = np.array(list(column[rows]), float).reshape(-1, 4, 2)
     except (ValueError, TypeError):
         raise InputError(f"{path}: expected plans of four corners, found another number of coordinates") from None
     corners = np.round(metres / grid_m).astype(np.int64)
-    along = np.roll(corners, -1, axis=1) - corners
-    turn = along[:, :, 0] * np.roll(along, -1, axis=1)[:, :, 1] - along[:, :, 1] * np.roll(along, -1, axis=1)[:, :, 0]
-    around = np.stack([corners.min(axis=1), corners.max(axis=1)], axis=1)
-    bad = np.flatnonzero((turn <= 0).any(axis=1) | (around != cells[rows][:, :, :2]).any(axis=(1, 2)))
+    around = plan_bounds(corners)
+    bad = np.flatnonzero(~are_convex(corners) | (around != cells[rows][:, :, :2]).any(axis=(1, 2)))
     if len(bad):
         raise InputError(
             f"{path}: expected convex plans, counter-clockwise, that touch their box on every side, "

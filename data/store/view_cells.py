@@ -10,7 +10,7 @@ import pyarrow.csv
 
 from ..errors import InputError
 from ..graph import CellGraph
-from ..plans import NO_PLANS, Plans
+from ..plans import NO_PLANS, Plans, are_convex, box_corners, come_last, plan_bounds, turned_plan
 from ..scene import GRID_LIMIT, Scene, turned
 from ..view_cells import as_graph
 from .graph_folder import CELL_COLUMNS, inhabitable_column, numbers, optional_column
@@ -66,7 +66,7 @@ def read_view_cells(path: str | Path, scene: Scene) -> CellGraph:
         raise InputError(f"{path}: expected cell_id 0 to {len(order) - 1}, each once, found {ends}")
     graph = view.graph
     plans = graph.plans.take(order, len(order))
-    if not np.array_equal(plans.rows, np.arange(len(order) - len(plans.rows), len(order))):
+    if not come_last(plans.rows, len(order)):
         raise InputError(f"{path}: expected the highest cell_id for cells with a plan, found one below others")
     return as_graph(graph.cells[order], graph.cell_names[order], graph.inhabitable[order], plans)
 
@@ -106,11 +106,11 @@ def view_cells(
         prisms = {row: corners - shift[:2] for row, corners in prisms.items()}
     else:
         # Boxes of another frame stand at an angle in this one.
-        every = {row: _box_corners(box) for row, box in enumerate(boxes)} | prisms
+        every = dict(enumerate(box_corners(boxes))) | prisms
         prisms = {row: _moved(corners, origin, yaw_deg, scene) for row, corners in every.items()}
         boxes = boxes - np.array([0.0, 0.0, 1.0]) * (scene.origin - origin)
         for row, corners in prisms.items():
-            boxes[row, :, :2] = corners.min(axis=0), corners.max(axis=0)
+            boxes[row, :, :2] = plan_bounds(corners)
     steps = boxes / scene.grid_m
     if np.abs(steps).max() > GRID_LIMIT:
         raise InputError(
@@ -144,23 +144,15 @@ def _corners(table: pa.Table, boxes: np.ndarray, where: str) -> dict[int, np.nda
             continue
         corners = np.array(plan, float) if len(plan) == 8 else np.zeros(8)
         corners = corners.reshape(4, 2)
-        along = np.roll(corners, -1, axis=0) - corners
-        bend = np.roll(along, -1, axis=0)
-        if not (along[:, 0] * bend[:, 1] > along[:, 1] * bend[:, 0]).all():
+        if not are_convex(corners):
             raise InputError(f"{where}: expected plans of four corners, convex and counter-clockwise, found {plan}")
         found[row] = corners
     return found
 
 
-def _box_corners(box: np.ndarray) -> np.ndarray:
-    (x, y, _), (u, v, _) = box
-    return np.array([[x, y], [u, y], [u, v], [x, v]])
-
-
 def _moved(corners: np.ndarray, origin: np.ndarray, yaw_deg: float, scene: Scene) -> np.ndarray:
     """Plan corners of a table's frame in the scene's [m]."""
-    level = np.column_stack([corners, np.zeros(4)])
-    return turned(turned(level, yaw_deg) + origin - scene.origin, -scene.yaw_deg)[:, :2]
+    return turned_plan(turned_plan(corners, yaw_deg) + origin[:2] - scene.origin[:2], -scene.yaw_deg)
 
 
 def _plans(prisms: dict[int, np.ndarray], cells: np.ndarray, grid_m: float, inwards: bool, where: str) -> Plans:
@@ -176,7 +168,7 @@ def _plans(prisms: dict[int, np.ndarray], cells: np.ndarray, grid_m: float, inwa
     rows = np.array(sorted(prisms), np.int64)
     if not len(rows):
         return NO_PLANS
-    if not np.array_equal(rows, np.arange(len(cells) - len(rows), len(cells))):
+    if not come_last(rows, len(cells)):
         raise InputError(f"{where}: expected cells with a plan after all others, found one before row {rows[0] + 1}")
     corners = np.array([prisms[row] for row in rows.tolist()]) / grid_m
     exact = (corners == np.round(corners)).all(axis=(1, 2))
@@ -185,7 +177,7 @@ def _plans(prisms: dict[int, np.ndarray], cells: np.ndarray, grid_m: float, inwa
     length = np.maximum(np.linalg.norm(away, axis=2, keepdims=True), 1e-9)
     moved = corners + away / length * (-TWO_STEPS if inwards else TWO_STEPS)
     corners = np.round(np.where(exact[:, None, None], corners, moved)).astype(np.int64)
-    cells[rows, 0, :2], cells[rows, 1, :2] = corners.min(axis=1), corners.max(axis=1)
+    cells[rows, :, :2] = plan_bounds(corners)
     return Plans(rows, corners.astype(np.int32))
 
 
