@@ -28,7 +28,7 @@ class ModelSettings:
         doors_by: in place of the words for doors.
         leave_out: parts whose name, GUID or kind it finds are not read.
         yaw: what the model is turned back by about the vertical [degrees], or "auto" for the angle at which most of its
-            walls stand. Models whose view cells are a table of boxes are not turned.
+            walls stand. Boxes of a table then stand at an angle, as prisms.
         seal: cracks narrower than this are closed [m]; 0 closes none. What is seen through them alone is then hidden
             though visible, and listed in leaks.parquet.
         split: connected components become objects of their own.
