@@ -18,6 +18,7 @@ from .scene import Scene
 SMALLEST_SIDE_M = 0.3
 SMALLEST_ROOM_M3 = 5.0
 SEALED_SHARE = 0.5
+# Doors, windows and voids are shut where a portal lies within this of their boxes.
 SHUT_MARGIN_M = 0.01
 # A cell is named after the rooms that hold so much of it.
 NAMED_SHARE = 0.3
@@ -98,12 +99,18 @@ def _rooms_of(scene: Scene, graph: CellGraph, roomy: np.ndarray) -> np.ndarray:
     return names
 
 
-def _flood(scene: Scene, graph: CellGraph) -> tuple[np.ndarray, list[int]]:
-    """Cells in components of room size that only a shut opening joins to the rest, and a leak path if there is one."""
+def shut_portals(scene: Scene, graph: CellGraph) -> np.ndarray:
+    """Which portals are shut with the doors, windows and voids of a scene, shape (portals,), bool."""
     shut = np.zeros(graph.portal_count, bool)
     margin = SHUT_MARGIN_M / scene.grid_m
     for low, high in scene.openings / scene.grid_m:
         shut |= ((graph.portals[:, 0] >= low - margin) & (graph.portals[:, 1] <= high + margin)).all(axis=1)
+    return shut
+
+
+def _flood(scene: Scene, graph: CellGraph) -> tuple[np.ndarray, list[int]]:
+    """Cells in components of room size that only a shut opening joins to the rest, and a leak path if there is one."""
+    shut = shut_portals(scene, graph)
     a, b = graph.portal_cells[~shut].T
     links = coo_matrix((np.ones(len(a)), (a, b)), shape=(graph.cell_count, graph.cell_count)).tocsr()
     _, component = connected_components(links, directed=False)

@@ -6,10 +6,8 @@ from scipy.sparse.csgraph import connected_components
 
 from .cracks import crack_portals
 from .graph import OTHER_AXES, CellGraph
+from .inhabit import shut_portals
 from .scene import Scene
-
-# Doors, windows and voids are shut where a portal lies within this of their boxes.
-SHUT_MARGIN_M = 0.01
 
 
 def cells_behind_cracks(scene: Scene, graph: CellGraph, width_m: float) -> np.ndarray:
@@ -23,10 +21,7 @@ def cells_behind_cracks(scene: Scene, graph: CellGraph, width_m: float) -> np.nd
     Returns:
         Shape (cells,), bool. A balcony, or a room whose doors the model does not tell, is joined by more than cracks.
     """
-    shut = np.zeros(graph.portal_count, bool)
-    margin = SHUT_MARGIN_M / scene.grid_m
-    for low, high in scene.openings / scene.grid_m:
-        shut |= ((graph.portals[:, 0] >= low - margin) & (graph.portals[:, 1] <= high + margin)).all(axis=1)
+    shut = shut_portals(scene, graph)
     leaky = _outside(graph, ~shut) & graph.inhabitable
     # Telling cracks from narrow parts of wide openings is slow, and cracks are narrow: most models end here.
     sizes = (graph.portals[:, 1] - graph.portals[:, 0])[np.arange(graph.portal_count)[:, None], OTHER_AXES[
