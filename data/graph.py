@@ -58,6 +58,12 @@ class CellGraph:
         """Number of portals."""
         return len(self.portals)
 
+    @property
+    def portal_sides(self) -> np.ndarray:
+        """Shorter and longer side of each portal [grid steps], shape (portals, 2), int32."""
+        # Across its axis it is flat.
+        return np.sort(self.portals[:, 1] - self.portals[:, 0], axis=1)[:, 1:]
+
     def with_portals(self, chosen: np.ndarray) -> "CellGraph":
         """The same cells with some of the portals: indices or a mask."""
         kept = self.portal_cells[chosen], self.portal_axis[chosen], self.portals[chosen]

@@ -5,7 +5,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from .cracks import crack_portals
-from .graph import OTHER_AXES, CellGraph
+from .graph import CellGraph
 from .inhabit import shut_portals
 from .scene import Scene
 
@@ -24,10 +24,7 @@ def cells_behind_cracks(scene: Scene, graph: CellGraph, width_m: float) -> np.nd
     shut = shut_portals(scene, graph)
     leaky = _outside(graph, ~shut) & graph.inhabitable
     # Telling cracks from narrow parts of wide openings is slow, and cracks are narrow: most models end here.
-    sizes = (graph.portals[:, 1] - graph.portals[:, 0])[np.arange(graph.portal_count)[:, None], OTHER_AXES[
-        graph.portal_axis
-    ]]  # fmt: skip
-    narrow = sizes.min(axis=1) < width_m / scene.grid_m
+    narrow = graph.portal_sides[:, 0] < width_m / scene.grid_m
     if not (leaky & ~_outside(graph, ~shut & ~narrow)).any():
         return np.zeros(graph.cell_count, bool)
     return leaky & ~_outside(graph, ~shut & ~crack_portals(graph, width_m / scene.grid_m))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...data.cracks import crack_portals
-from ...data.graph import OTHER_AXES, CellGraph
+from ...data.graph import CellGraph
 from ...data.prepared import PreparedModel
 from ...data.scene import Scene
 from ..bake.cells import PORTAL_TRIANGLES, build_graph
@@ -86,12 +86,10 @@ def find_cells(model: PreparedModel, *, tried: int = TRIED) -> Cells:
 
 def find_cracks(scene: Scene, graph: CellGraph) -> list[Crack]:
     """Openings no wider than a crack, in pieces as cells cut them; those into rooms first, the longest first."""
-    sides = (graph.portals[:, 1] - graph.portals[:, 0])[np.arange(graph.portal_count)[:, None], OTHER_AXES[
-        graph.portal_axis
-    ]] * scene.grid_m  # fmt: skip
+    sides = graph.portal_sides * scene.grid_m
     narrow = np.flatnonzero(crack_portals(graph, CRACKS_M[-1] / scene.grid_m))
     rooms = graph.inhabitable[graph.portal_cells[narrow]].any(axis=1)
-    order = np.lexsort([narrow, -sides[narrow].max(axis=1), ~rooms])
+    order = np.lexsort([narrow, -sides[narrow, 1], ~rooms])
     boxes, opaque = scene.object_bounds(), np.flatnonzero([placed.opaque for placed in scene.objects])
     cracks = []
     for place in order:
@@ -102,7 +100,7 @@ def find_cracks(scene: Scene, graph: CellGraph) -> list[Crack]:
         along = np.minimum(boxes[opaque, 1], box[1]) - np.maximum(boxes[opaque, 0], box[0])
         near = opaque[np.lexsort([-np.maximum(along, 0).sum(axis=1), apart.max(axis=1)])[:NEAREST]]
         names = tuple(scene.objects[i].name for i in near)
-        low, high = sides[portal].min(), sides[portal].max()
+        low, high = sides[portal]
         cracks.append(Crack(box * scene.grid_m, float(low), float(high), names, bool(rooms[place])))
     return cracks
 
