@@ -18,8 +18,6 @@ from .stab import AT_POLYGON, append_entry, clip_spare, start_level, vec6i
 f64 = wp.float64
 mat42d = wp.types.matrix(shape=(4, 2), dtype=wp.float64)
 
-# How a line misses the plan of an end: on its left or its right, of the source or the target.
-MISSES = wp.constant(4)
 CORNERS = wp.constant(4)
 # Tags of cuts by an edge that parts the plans are this, plus eight times the edge.
 PARTING = wp.constant(certificates.PARTING)

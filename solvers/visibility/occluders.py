@@ -241,10 +241,10 @@ def _prove_pieces_of(
     at = rows[lined]
     prisms = model.sights.plans.take(source[at], len(model.cells))
     hints[at] = np.stack(segments(answers, lined, model.cells[source[at]], boxes[at], prisms), axis=1)
-    # A line past all rectangles that meets no oblique occluder either: there is nothing to prove.
-    # Shafts lead from box to box.
     at = rows[answers.verdict != Verdict.HIDDEN]
+    # Shafts lead from box to box.
     at = at[apart(model.cells[source[at]], boxes[at])]
+    # A line past all rectangles that meets no oblique occluder either: there is nothing to prove.
     at = at[patches_met(model.shields, hints[at, 0], hints[at, 1], device=model.sights.device)]
     proofs = _shaft(model, source[at], boxes[at], ledger, pair[at])
     hidden = proofs.verdict == Verdict.HIDDEN

@@ -56,11 +56,11 @@ class PortalEngine:
         """
         self._certify, self._least_unknown = certify, LEAST_UNKNOWN[method]
         self._objects = len(model.scene.objects)
-        self._plans, graph_of_tiles = graph.plans, graph.tiles
+        tiles = graph.tiles
         self._sights = Sights.of(model, graph.cells, seed, device, graph.plans)
-        self._incidence = populate(model.scene, graph_of_tiles.cells)
-        blockers = model.walls if certify else model.blockers(graph_of_tiles)
-        self.model = CellModel(graph_of_tiles, blockers, self._sights, seed, device)
+        self._incidence = populate(model.scene, tiles.cells)
+        blockers = model.walls if certify else model.blockers(tiles)
+        self.model = CellModel(tiles, blockers, self._sights, seed, device)
 
     @property
     def proof_occluders(self) -> tuple[Blockers, Regions, Patches]:
