@@ -210,7 +210,7 @@ def room_prisms(space: Space, grid_m: float) -> list[tuple[np.ndarray, np.ndarra
     """
     yaw = wall_yaw([(space.vertices, space.faces)], SNAPPED_DEG)
     level = Space(space.name, turned(space.vertices, -yaw), space.faces)
-    found, area = [], 0.0
+    found = []
     for bottom, top, xs, ys, mask in _slices(level):
         size, left = np.outer(np.diff(xs), np.diff(ys)), mask.copy()
         area = float(size[mask].sum())
@@ -243,7 +243,8 @@ def _slices(level: Space) -> list[tuple[float, float, np.ndarray, np.ndarray, np
     low, high = level.vertices.min(axis=0), level.vertices.max(axis=0)
     top = min(low[2] + HIGHEST_EYE_M, high[2])
     heights = _heights(level, float(low[2]), float(top))
-    xs, ys = (_lines(level.vertices[:, axis], _bends(level)) for axis in (0, 1))
+    oblique = _bends(level)
+    xs, ys = (_lines(level.vertices[:, axis], oblique) for axis in (0, 1))
     found: list[tuple[float, float, np.ndarray, np.ndarray, np.ndarray]] = []
     # Beside the middle, where a diagonal of two triangles may run.
     x, y = (0.497 * lines[1:] + 0.503 * lines[:-1] for lines in (xs, ys))
@@ -262,24 +263,28 @@ def _slices(level: Space) -> list[tuple[float, float, np.ndarray, np.ndarray, np
 
 def _heights(level: Space, low: float, top: float) -> np.ndarray:
     """Heights between which a room is one prism, or nearly so where it has slopes."""
-    corners = level.vertices[level.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    size = np.linalg.norm(normals, axis=1)
+    normals, size = _face_normals(level)
     upright = np.abs(normals[:, 2]) <= UPRIGHT * size
     flat = np.abs(normals[:, :2]).max(axis=1) <= UPRIGHT * size
     own = np.unique(np.round(level.vertices[:, 2], 3))
-    sloped = ((corners[:, :, 2].min(axis=1) < top - 0.01) & ~upright & ~flat & (size > 0)).any()
+    lowest = level.vertices[level.faces][:, :, 2].min(axis=1)
+    sloped = ((lowest < top - 0.01) & ~upright & ~flat & (size > 0)).any()
     steps = np.linspace(low, top, max(2, round((top - low) / SLICE_M) + 1)) if sloped else np.array([low, top])
     inner = own[(own > low + 0.01) & (own < top - 0.01)]
     heights = np.unique(np.concatenate([steps, inner[:MOST_BENDS]]))
     return heights[np.append(True, np.diff(heights) > 0.01)]
 
 
-def _bends(level: Space) -> bool:
-    """Whether a room has upright faces off the axes of its frame, or sloped ones: its middle then says little."""
+def _face_normals(level: Space) -> tuple[np.ndarray, np.ndarray]:
+    """Normals of a room's faces, shape (faces, 3), and their lengths: twice the faces' areas."""
     corners = level.vertices[level.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    size = np.linalg.norm(normals, axis=1)
+    return normals, np.linalg.norm(normals, axis=1)
+
+
+def _bends(level: Space) -> bool:
+    """Whether a room has upright faces off the axes of its frame, or sloped ones: its middle then says little."""
+    normals, size = _face_normals(level)
     oblique = (np.abs(normals[:, 2]) <= UPRIGHT * size) & (np.abs(normals[:, :2]).min(axis=1) > OBLIQUE * size)
     sloped = (np.abs(normals[:, 2]) > UPRIGHT * size) & (np.abs(normals[:, :2]).max(axis=1) > OBLIQUE * size)
     return bool((oblique | sloped).any())
