@@ -5,6 +5,7 @@ import pyarrow as pa
 import pytest
 import trimesh
 from builders import random_solids
+from viewcell.data.frame import in_frame
 from viewcell.data.scene import Role
 from viewcell.data.store.scene_folder import write_scene
 from viewcell.solvers.visibility.aim import Sights
@@ -47,14 +48,15 @@ def looked_at(request, monkeypatch):
 
 
 @pytest.mark.usefixtures("looked_at")
-@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(("turned", "yaw"), [(False, "auto"), (True, "0"), (True, "auto")])
 @pytest.mark.parametrize("method", ["portals", "occluders", "both", pytest.param("vlod", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("role", Role)
-def test_a_bake_hides_behind_what_is_opaque_only(role, method, turned, cells, tmp_path):
-    """Portals alone do not know what is oblique."""
-    settings = Settings(method=method, cells=cells, resolution=64)
+def test_a_bake_hides_behind_what_is_opaque_only(role, method, turned, yaw, cells, tmp_path):
+    """Portals alone do not know what is oblique; in its own frame only a screen that is a wall is not."""
+    settings = Settings(method=method, cells=cells, resolution=64, yaw=yaw)
     made = bake(scene(role, turned), tmp_path / "b", settings=settings, threads=1)
-    hides = role in OPAQUE and not (turned and method == "portals")
+    oblique = turned and (yaw == "0" or role is not Role.OCCLUDER)
+    hides = role in OPAQUE and not (oblique and method == "portals")
     assert made.potential_objects[0].tolist() == [True, not hides, True]
     assert verify_bake(made, rays=4000).ok
 
@@ -75,7 +77,7 @@ def test_certificates_are_about_what_is_opaque_only(role, turned, cells, tmp_pat
 def test_what_has_become_glass_proves_nothing(role, turned, cells, tmp_path):
     settings = Settings(method="occluders", cells=cells, certify=True)
     made = bake(scene(Role.OCCLUDER, turned), tmp_path / "b", settings=settings, threads=1)
-    made.__dict__["scene"] = scene(role, turned)
+    made.__dict__["scene"] = in_frame(scene(role, turned), made.scene.yaw_deg)
     assert (check_certificates(made).failed > 0) == (role not in OPAQUE)
 
 

@@ -104,15 +104,14 @@ def test_a_refined_bake_keeps_less_and_is_as_true(certify, tmp_path):
 
 
 def test_a_bare_graph_has_nothing_to_halve(tmp_path):
-    with pytest.raises(viewcell.InputError, match="expected a model whose cells to halve, found a bare graph"):
+    with pytest.raises(viewcell.InputError, match="expected a model whose cells to cut, found a bare graph"):
         viewcell.bake(corridors.graph_folder("office", tmp_path), settings=Settings(refine_kept=2.0))
 
 
-def test_a_leak_path_keeps_its_cells(monkeypatch):
+def test_a_leak_path_keeps_its_cells():
     """Ids move on by the halves before them."""
     cells, parents = np.array([[[0, 0, 0], [k + 1, 1, 1]] for k in range(5)], np.int32), np.array([0, 1, 1, 2, 3])
-    monkeypatch.setattr(choosing, "halved", lambda *_: (cells, parents))
     graph = as_graph(cells[:4], np.array(list("abcd"), object), np.array([False, True, True, False]))
-    made, notes = choosing._halved_graph(corridor(), graph, {"leak_cells": [3, 1], "dead_cells": 7}, Settings())
+    made, notes = choosing._cut_graph(corridor(), graph, {"leak_cells": [3, 1], "dead_cells": 7}, cells, parents)
     assert notes == {"leak_cells": [4, 1], "dead_cells": 7}
     assert made.cell_names.tolist() == list("abbcd") and made.inhabitable.tolist() == [False, True, True, True, False]
