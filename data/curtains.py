@@ -23,8 +23,8 @@ from .scene import turned
 from .solids import winding_numbers
 
 # `Blockers.axis` of a curtain from the corner of its plan box with the least x and y to the opposite one, and of one
-# from least x and greatest y; with COMPOSITE - RISING added where smaller pieces, or what lies behind, say the same.
-RISING, FALLING, COMPOSITE = 3, 4, 5
+# from least x and greatest y.
+RISING, FALLING = 3, 4
 # Rectangles below this hide little.
 LEAST_M2 = 0.25
 # Halving a curtain ends here.
@@ -60,19 +60,17 @@ def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float) 
         if not len(quads):
             continue
         quads = quads[_inside(quads, triangles)]
-        for part, composite in _pieces(quads, PIECE_M / grid_m):
-            _add(boxes, kinds, part, composite)
-        for part, composite in zip(_tips(quads, triangles), (False, True), strict=True):
-            _add(boxes, kinds, part, composite)
-    _add(boxes, kinds, _upright_faces(faces, least), True)
+        for part in [*_pieces(quads, PIECE_M / grid_m), *_tips(quads, triangles)]:
+            _add(boxes, kinds, part)
+    _add(boxes, kinds, _upright_faces(faces, least))
     joined = np.concatenate(boxes).astype(np.int32)
     return Blockers(joined, np.concatenate(kinds).astype(np.int32), build_hierarchy(joined))
 
 
-def _add(boxes: list[np.ndarray], kinds: list[np.ndarray], quads: np.ndarray, composite: bool) -> None:
+def _add(boxes: list[np.ndarray], kinds: list[np.ndarray], quads: np.ndarray) -> None:
     """Enter curtains (A, B) x (x, y, z), the z of A below that of B; one along an axis is a plain rectangle."""
     way = quads[:, 1] - quads[:, 0]
-    kind = np.where(way[:, 0] * way[:, 1] > 0, RISING, FALLING) + composite * (COMPOSITE - RISING)
+    kind = np.where(way[:, 0] * way[:, 1] > 0, RISING, FALLING)
     kind[way[:, 1] == 0] = 1
     kind[way[:, 0] == 0] = 0
     boxes.append(np.sort(quads, axis=1))
@@ -146,8 +144,8 @@ def _cuts(depths: np.ndarray, low: int, high: int, thin: float) -> list[int]:
     return sorted(cuts)
 
 
-def _pieces(quads: np.ndarray, least: float) -> list[tuple[np.ndarray, bool]]:
-    """Curtains with their halves and the halves of those, down to a length; and whether each lot has smaller pieces."""
+def _pieces(quads: np.ndarray, least: float) -> list[np.ndarray]:
+    """Curtains with their halves and the halves of those, down to a length, in lots."""
     found = []
     length = np.hypot(*(quads[:, 1, :2] - quads[:, 0, :2]).T)
     times = np.maximum(0, np.floor(np.log2(np.maximum(length, 1.0) / least))).astype(int)
@@ -161,7 +159,7 @@ def _pieces(quads: np.ndarray, least: float) -> list[tuple[np.ndarray, bool]]:
             piece = np.empty((len(mine), parts, 2, 3), np.int64)
             piece[:, :, 0, :2], piece[:, :, 1, :2] = points[:, :-1], points[:, 1:]
             piece[:, :, :, 2] = mine[:, None, :, 2]
-            found.append((piece.reshape(-1, 2, 3), level < most))
+            found.append(piece.reshape(-1, 2, 3))
     return found
 
 

@@ -25,7 +25,7 @@ CURTAIN_WAYS = wp.constant(10)
 @wp.func
 def rises(kind: int, octant: int) -> bool:
     """Whether a curtain leads to greater y with greater x, after mirroring."""
-    rising = (kind - FIRST_CURTAIN) % 2 == 0
+    rising = kind == FIRST_CURTAIN
     if (octant & 1) != ((octant >> 1) & 1):
         return not rising
     return rising

@@ -53,7 +53,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..blockers import Blockers
-from ..curtains import COMPOSITE, RISING
+from ..curtains import RISING
 from ..graph import OTHER_AXES
 from ..opaque import decompose
 from ..patches import Patches
@@ -184,8 +184,7 @@ def certificate_tables(
 
 def _blockers_table(used: np.ndarray, blockers: Blockers, grid_m: float) -> pa.Table:
     used = used[used < len(blockers.axis)]
-    # Whether a curtain has smaller pieces is of no interest to a checker.
-    kind = np.where(blockers.axis[used] >= COMPOSITE, blockers.axis[used] - COMPOSITE + RISING, blockers.axis[used])
+    kind = blockers.axis[used]
     axis = np.where(kind >= RISING, 2, kind)
     uv = OTHER_AXES[axis] if len(used) else np.zeros((0, 2), int)
     rows = np.arange(len(used))

@@ -30,9 +30,9 @@ def corridor(count: int, step: int = 64) -> CellGraph:
 
 
 def office_graph(floors: int = 1, rooms_per_side: int = 3, **options: object) -> CellGraph:
-    """Cells of a made office."""
+    """Cells of a made office, which tile space."""
     scene = make_office(floors=floors, rooms_per_side=rooms_per_side, **options)
-    return model_sources(PreparedModel(scene), Settings(), Clock()).graph
+    return model_sources(PreparedModel(scene), Settings(), Clock()).graph.tiles
 
 
 def write_graph(graph: CellGraph, folder: Path) -> Path:

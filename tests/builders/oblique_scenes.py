@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 from viewcell.data.blockers import Blockers
-from viewcell.data.curtains import COMPOSITE, FALLING, RISING
+from viewcell.data.curtains import FALLING, RISING
 from viewcell.data.hierarchy import build_hierarchy
 from viewcell.data.plans import Plans
 from viewcell.data.verdict import Verdict
@@ -36,11 +36,9 @@ class Oblique:
     quads: np.ndarray
     strict: bool
 
-    def blockers(self, *, composite: bool = False) -> Blockers:
+    def blockers(self) -> Blockers:
         boxes = np.sort(self.quads, axis=1).astype(np.int32)
-        kinds = [kind_of(quad) for quad in self.quads]
-        kinds = [kind + (COMPOSITE - RISING if composite and kind >= RISING else 0) for kind in kinds]
-        return Blockers(boxes, np.array(kinds, np.int32), build_hierarchy(boxes))
+        return Blockers(boxes, np.array([kind_of(quad) for quad in self.quads], np.int32), build_hierarchy(boxes))
 
     def known(self) -> dict[int, Blocker]:
         """The same for the checker."""
@@ -187,15 +185,14 @@ def scene(seed: int, curtains: int = 6) -> Oblique:
     return Oblique(boxes, plans, np.array(quads), strict)
 
 
-def halved(made: Oblique, depth: int = 3) -> tuple[Oblique, np.ndarray]:
-    """The scene with each curtain as halves of halves where these end on the grid; and which have smaller ones."""
-    quads, composite = [], []
+def halved(made: Oblique, depth: int = 3) -> Oblique:
+    """The scene with each curtain as halves of halves where these end on the grid."""
+    quads = []
     for quad in made.quads:
         parts = [quad]
-        for level in range(depth + 1):
+        for _ in range(depth + 1):
             even = all(((part[1, :2] - part[0, :2]) % 2 == 0).all() for part in parts)
             quads += parts
-            composite += [even and level < depth] * len(parts)
             if not even:
                 break
             middles = [(part[0] + part[1]) // 2 for part in parts]
@@ -205,7 +202,7 @@ def halved(made: Oblique, depth: int = 3) -> tuple[Oblique, np.ndarray]:
                 for part, m in halves
                 for a, b in ((part[0], m), (m, part[1]))
             ]
-    return replace(made, quads=np.array(quads)), np.array(composite)
+    return replace(made, quads=np.array(quads))
 
 
 def span(box: np.ndarray, plan, origins: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -279,14 +276,14 @@ def shown(made: Oblique, seed: int, count: int) -> bool:
     return bool(len(origins) and clear(made, origins, ends).any())
 
 
-def search(made: Oblique, cap: int = 5000, blockers: Blockers | None = None) -> TargetAnswers:
-    tree, rows = blocker_tree(blockers or made.blockers()), np.array([[0, 1, int(made.strict)]])
+def search(made: Oblique, cap: int = 5000) -> TargetAnswers:
+    tree, rows = blocker_tree(made.blockers()), np.array([[0, 1, int(made.strict)]])
     return launch_target_search(tree, made.boxes.astype(np.int32), rows, plans=made.planned(), cap=cap)
 
 
-def words_of(made: Oblique, answers: TargetAnswers, blockers: Blockers | None = None) -> list[int]:
+def words_of(made: Oblique, answers: TargetAnswers) -> list[int]:
     """The line tree of a hidden scene; empty if it could not be told."""
-    tree, rows = blocker_tree(blockers or made.blockers()), np.array([[0, 1, int(made.strict)]])
+    tree, rows = blocker_tree(made.blockers()), np.array([[0, 1, int(made.strict)]])
     boxes = made.boxes.astype(np.int32)
     return launch_line_trees(tree, boxes, rows, answers.nodes, plans=made.planned()).words.tolist()
 
@@ -341,14 +338,14 @@ def line_holds(made: Oblique, answers: TargetAnswers) -> bool:
     return True
 
 
-def judge(made: Oblique, cap: int = 5000, blockers: Blockers | None = None) -> Verdict:
+def judge(made: Oblique, cap: int = 5000) -> Verdict:
     """The verdict, after its line was checked in rationals or its proof in whole numbers."""
-    answers = search(made, cap, blockers)
+    answers = search(made, cap)
     verdict = Verdict(int(answers.verdict[0]))
     if verdict == Verdict.VISIBLE:
         assert line_holds(made, answers), "wrong-visible"
     if verdict == Verdict.HIDDEN:
-        words = words_of(made, answers, blockers)
+        words = words_of(made, answers)
         assert words == [] or proved(made, words), "a proof that does not hold"
         assert words or not leads(made), "no proof"
     return verdict

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from builders import random_solids
-from viewcell.data.curtains import COMPOSITE, FALLING, RISING, crossed, find_curtains, meeting
+from viewcell.data.curtains import FALLING, crossed, find_curtains, meeting
 from viewcell.data.prepared import PreparedModel
 from viewcell.data.scene import GRID_M
 from viewcell.verify.proofs.curtain import is_opaque
@@ -72,9 +72,8 @@ def opaque(curtains, surfaces):
     """Which curtains are opaque by the checker."""
     found = []
     for (low, high), axis in zip(curtains.boxes.tolist(), curtains.axis.tolist(), strict=True):
-        kind = axis - COMPOSITE + RISING if axis >= COMPOSITE else axis
         a, b = [low[0], low[1]], [high[0], high[1]]
-        if kind == FALLING:
+        if axis == FALLING:
             a, b = [low[0], high[1]], [high[0], low[1]]
         found.append(is_opaque(surfaces, [a, b], low[2], high[2]))
     return found

@@ -120,7 +120,8 @@ def test_a_house_on_the_axes_is_not_touched(tmp_path):
     assert plain.notes == auto.notes and auto.yaw_deg == 0.0
 
 
-def test_boxes_of_the_model_are_prisms_in_a_turned_bake(tmp_path):
+@pytest.mark.parametrize(("yaw", "form"), [("0", 1), ("5", 2)])
+def test_boxes_of_the_model_are_prisms_in_a_turned_bake(yaw, form, tmp_path):
     """The box lies in the prism, what is claimed of one holds for the other, and eyes in it judge either frame."""
     path, table = house(tmp_path / "a.obj", 17.0), tmp_path / "cells.csv"
     table.write_text("min_x,min_y,min_z,max_x,max_y,max_z\n0.2,1.5,0.5,0.6,1.9,1\n")
@@ -130,8 +131,8 @@ def test_boxes_of_the_model_are_prisms_in_a_turned_bake(tmp_path):
     x, y, _ = made.in_model(np.column_stack([plan, np.zeros(4)])).T
     assert x.min() <= 0.2 and x.max() >= 0.6 and y.min() <= 1.5 and y.max() >= 1.9
     np.testing.assert_allclose(made.in_bake(made.in_model(plan_at := np.array([[1.0, 2.0, 3.0]]))), plan_at, atol=1e-12)
-    plain = bake(path, tmp_path / "c", settings=Settings(cells=str(table), yaw="0"), threads=1)
-    assert plain.manifest["yaw_deg"] == 0.0 and plain.manifest["format"] == 1
+    plain = bake(path, tmp_path / "c", settings=Settings(cells=str(table), yaw=yaw), threads=1)
+    assert plain.manifest["yaw_deg"] == float(yaw) and plain.manifest["format"] == form
     assert set(plain.seen(0)) <= set(made.potential(0)) and set(made.seen(0)) <= set(plain.potential(0))
     for claim in (made, plain):
         assert check(path, claim.folder, table, rays=20_000).ok

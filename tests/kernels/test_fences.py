@@ -20,7 +20,7 @@ def fences_of(seeds: range, scale: int) -> list[int]:
     """Numbers of the fences in the trees of hidden scenes, whose proofs hold."""
     found = []
     for seed in seeds:
-        made = larger(halved(scene(seed))[0], scale)
+        made = larger(halved(scene(seed)), scale)
         answers = search(made)
         judge(made)
         if answers.verdict[0] == HIDDEN:
@@ -43,7 +43,7 @@ def steep(gap: int) -> Oblique:
     plan = np.array([[0, 0], [300, 100], [260, 220], [-40, 120]])
     boxes = np.array([[[100, -900, 800], [160, -800, 900]], around(plan, (0, 40))])
     wall = ordered(np.array([[-2000, -700, 40 + gap], [2096, 708, 4000]]))
-    return halved(Oblique(boxes, (None, plan), wall[None], True), 6)[0]
+    return halved(Oblique(boxes, (None, plan), wall[None], True), 6)
 
 
 def test_a_wall_over_a_low_prism():

@@ -92,8 +92,8 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
     large = len(scene.triangles()[0]) > PORTAL_TRIANGLES
     if not cells:
         cells = "octree" if method in ("occluders", "vlod") or (method == "auto" and large) else "portals"
-    if cells == "portals" and method == "vlod":
-        raise InputError("cells: expected octree or a table for the method vlod, found portals")
+    if cells == "portals" and method in ("occluders", "vlod"):
+        raise InputError(f"cells: expected octree or a table for the method {method}, found portals")
     if cells == "portals":
         graph, notes = build_graph(model, settings, clock)
         if settings.largest_cell:

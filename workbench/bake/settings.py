@@ -168,12 +168,10 @@ class Settings(LevelSettings, MethodSettings, CellSettings, ModelSettings):
             raise InputError(f"method: expected {', '.join(METHODS)}, found {self.method!r}")
         if not 0 <= self.depth <= DEEPEST:
             raise InputError(f"depth: expected a whole number from 0 to {DEEPEST}, found {self.depth}")
-        if self.frame.get("yaw") not in (None, "auto", 0.0) and self.cells not in ("", "portals", "octree"):
-            raise InputError(f"yaw: expected auto or 0 beside a table of view cells, found {self.yaw}")
         check_number("refine-kept", self.refine_kept, 0.0)
         if 0.0 < self.refine_kept < 1.0:
             raise InputError(f"refine-kept: expected 0 or a ratio from 1, found {self.refine_kept:g}")
-        _ = self.pixel_limit, self.vlod
+        _ = self.frame, self.pixel_limit, self.vlod
 
 
 def check_number(name: str, value: float, least: float) -> None:

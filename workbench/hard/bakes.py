@@ -41,7 +41,7 @@ def bakes_by(method: str) -> Callable[[HardCases, Device], Outcomes]:
         for case in cases.model:
             with tempfile.TemporaryDirectory() as name:
                 model, cells = write_model(case, Path(name))
-                settings = Settings(method=method, cells=str(cells))
+                settings = Settings(method=method, cells=str(cells), yaw="0")
                 made = bake(read(model), Path(name) / "out.bake", settings=settings, threads=1, device=device.name)
                 yield case.name, _baked(case, made)
 

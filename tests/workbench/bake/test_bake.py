@@ -297,6 +297,7 @@ def test_a_bake_of_view_cells_that_were_changed_is_not_kept(tmp_path):
         ({"settings": Settings(refine_kept=-1.0)}, "refine-kept"),
         ({"settings": Settings(refine_kept=0.5)}, "refine-kept"),
         ({"settings": Settings(refine_kept=2.0, cells="octree")}, "refine-kept"),
+        ({"settings": Settings(method="occluders", cells="portals")}, "cells"),
     ],
 )
 def test_bad_arguments_are_one_line(options, message, office, tmp_path):
@@ -464,6 +465,7 @@ def test_shared_duplex(tmp_path):
     result = check_two_sided(bake, rays=1_000_000)
     inhabitable, _, objects = result.counts
     print(f"overestimate: cells {inhabitable.overestimate:.3f}, objects {objects.overestimate:.3f}")
-    assert inhabitable.overestimate < 1.15 and objects.overestimate < 1.3
+    # Two stairwells and the roof are view cells too: of their pairs more are open than elsewhere.
+    assert inhabitable.overestimate < 1.2 and objects.overestimate < 1.15
     again = viewcell.bake(model, tmp_path / "again", threads=1)
     assert same_tables(again, bake)
