@@ -14,7 +14,7 @@ install: .venv/installed
 	touch $@
 
 run: install
-	$(BIN)/viewcell make office --out out/office.scene
+	$(BIN)/viewcell make office --out out/office.scene --overwrite
 	$(BIN)/viewcell bake out/office.scene --out out/office --overwrite
 	$(BIN)/viewcell verify out/office
 	$(BIN)/viewcell report out/office

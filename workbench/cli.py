@@ -34,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         return getattr(commands, options.run)(options)
     except KeyboardInterrupt:
-        complain("interrupted; run the same command again to resume")
+        complain("interrupted")
         return INTERRUPTED
     except InputError as error:
         complain(str(error))
@@ -106,6 +106,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_curves(commands)
     _add_export(commands)
     _add_bench(commands)
+    _add_clean(commands)
     return parser
 
 
@@ -135,6 +136,7 @@ def _add_make(commands: argparse._SubParsersAction) -> None:
     office.add_argument(
         "--wing-angle", type=_number, default=30.0, metavar="DEG", help="of each to the one before; 30 by default"
     )
+    office.add_argument("--overwrite", action="store_true", help="replace what is at --out")
     _seed(office, "windows, doors and furniture")
     for name, text, counts in (
         ("plant", "a process plant's hall of any size", {"triangles": (100_000, "about how many; 100,000 by default")}),
@@ -157,6 +159,7 @@ def _add_make(commands: argparse._SubParsersAction) -> None:
         )
         for count, (usual, what) in counts.items():
             other.add_argument(f"--{count}", type=_whole(1), default=usual, help=what)
+        other.add_argument("--overwrite", action="store_true", help="replace what is at --out")
         _seed(other, "what stands where")
 
 
@@ -189,7 +192,9 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
     )
     bake.add_argument("--threads", type=_whole(1), help="CPU threads; all cores by default")
     bake.add_argument("--device", default="cpu", help="Warp device, such as cuda:0; cpu by default")
-    bake.add_argument("--overwrite", action="store_true", help="bake again even if BAKE is up to date")
+    bake.add_argument(
+        "--overwrite", action="store_true", help="bake again, even if BAKE is up to date or of something else"
+    )
     bake.add_argument("--no-progress", action="store_true", help="no progress bar")
     bake.add_argument(
         "--settings",
@@ -436,6 +441,13 @@ def _add_bench(commands: argparse._SubParsersAction) -> None:
     )
     bench.add_argument("--graphs", metavar="FOLDER", help="flood cells and portals in it, or in folders in it, too")
     bench.add_argument("--no-progress", action="store_true", help="no progress bar")
+
+
+def _add_clean(commands: argparse._SubParsersAction) -> None:
+    clean = _command(commands, "clean", "clean", "Remove unfinished work that killed bakes have left in a folder.")
+    clean.add_argument(
+        "folder", metavar="FOLDER", nargs="?", default=".", help="where the bakes are; the current folder by default"
+    )
 
 
 if __name__ == "__main__":

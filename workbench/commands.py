@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from ..data.errors import InputError
 from .summary import summary, table
-from .terminal import FAILED, say, silenced
+from .terminal import FAILED, INTERRUPTED, complain, say, silenced
 
 if TYPE_CHECKING:
     from ..data.scene import Scene
@@ -26,7 +26,7 @@ def make_office(options: argparse.Namespace) -> int:
     from ..data.buildings.office import make_office as build
     from ..data.buildings.statistics import level_statistics
 
-    out, write = _scene_writer(options.out)
+    out, write = _scene_writer(options)
     size = {"floors": options.floors, "rooms_per_side": options.rooms_per_side}
     size = {name: value for name, value in size.items() if value is not None}
     if options.like and size:
@@ -48,7 +48,7 @@ def make_other(options: argparse.Namespace) -> int:
     from ..data.buildings.rotunda import make_rotunda
     from ..data.buildings.statistics import level_statistics
 
-    out, write = _scene_writer(options.out)
+    out, write = _scene_writer(options)
     build = {"plant": make_plant, "city": make_city, "rotunda": make_rotunda, "arcade": make_arcade}[options.building]
     scene = build(seed=options.seed, **{count: getattr(options, count) for count in options.counts})
     write(scene, out)
@@ -58,15 +58,17 @@ def make_other(options: argparse.Namespace) -> int:
     return 0
 
 
-def _scene_writer(name: str) -> tuple[Path, Callable[["Scene", Path], None]]:
+def _scene_writer(options: argparse.Namespace) -> tuple[Path, Callable[["Scene", Path], None]]:
     """Where to write a scene, and how, by the name's ending."""
     from ..data.buildings.glb import write_glb
     from ..data.store.scene_folder import write_scene
 
     writers = {".scene": write_scene, ".glb": write_glb}
-    out = Path(name)
+    out = Path(options.out)
     if out.suffix not in writers:
-        raise InputError(f"out: expected a name ending in {' or '.join(writers)}, found {name!r}")
+        raise InputError(f"out: expected a name ending in {' or '.join(writers)}, found {options.out!r}")
+    if out.exists() and not options.overwrite:
+        raise InputError(f"{out}: expected a new name, found something there; --overwrite replaces it")
     return out, writers[out.suffix]
 
 
@@ -88,6 +90,7 @@ def inspect(options: argparse.Namespace) -> int:
 
 def bake(options: argparse.Namespace) -> int:
     """Bake a model and print what came of it."""
+    from .bake.place import leftovers
     from .bake.run import bake as compute
     from .bake.run import default_out
     from .bake.settings import Settings
@@ -100,22 +103,39 @@ def bake(options: argparse.Namespace) -> int:
     file = read_settings(options.settings) if options.settings else SettingsFile({}, {})
     settings = Settings(**(file.settings | given))
     out = Path(options.out) if options.out else default_out(model)
+    for folder in leftovers(out.absolute().parent, out.name):
+        say(f"unfinished: {folder.name}; the bake that it is of goes on from there, viewcell clean removes it")
     before = _stamp(out)
-    made = compute(
-        _read(model, options, settings.reading | settings.frame),
-        out,
-        settings=settings,
-        budget_s=options.budget,
-        threads=options.threads,
-        device=options.device,
-        overwrite=options.overwrite,
-        progress=_progress(options),
-        tuned=file.tuned,
-    )
+    try:
+        made = compute(
+            _read(model, options, settings.reading | settings.frame),
+            out,
+            settings=settings,
+            budget_s=options.budget,
+            threads=options.threads,
+            device=options.device,
+            overwrite=options.overwrite,
+            progress=_progress(options),
+            tuned=file.tuned,
+        )
+    except KeyboardInterrupt:
+        if not any(any(part.glob("*.arrow")) for part in leftovers(out.absolute().parent, out.name)):
+            raise
+        complain("interrupted; the same command goes on from there")
+        return INTERRUPTED
     say(summary(made))
     # A bake that is written anew is a new folder.
     fresh = _stamp(out) != before
     say(f"written to {made.folder}" if fresh else f"{made.folder} was up to date; --overwrite bakes it again")
+    return 0
+
+
+def clean(options: argparse.Namespace) -> int:
+    """Remove what killed commands have left in a folder, and say so."""
+    from .bake.place import clean as sweep
+
+    done = sweep(Path(options.folder))
+    say("\n".join(f"{what} {path}" for what, path in done) or f"{options.folder}: nothing was left unfinished there")
     return 0
 
 

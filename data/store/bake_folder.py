@@ -23,6 +23,7 @@ from ..kept import kept_shares
 from ..rows import Rows
 from ..scene import Scene, turned
 from ..verdict import Verdict
+from . import certificates
 from .graph_folder import CELL_COLUMNS, PORTAL_COLUMNS, plan_column, read_graph
 from .scene_folder import new_folder, read_manifest, read_table
 from .scene_tables import meshes_table, objects_table, scene_from_tables
@@ -31,6 +32,11 @@ WITNESS = ("origin_x", "origin_y", "origin_z", "direction_x", "direction_y", "di
 CELL_TO_CELL = ("cell_id", "reached_cell_id", "verdict", "portals", *WITNESS)
 CELL_TO_OBJECT = ("cell_id", "object_id", "verdict", *WITNESS)
 CELL_LODS = ("cell_id", "object_id", "lod")
+# All that a bake folder may hold.
+TABLES = (
+    *("meshes", "objects", "cells", "portals", "cell_to_cell", "cell_to_object", "cell_lods", "cracks", "leaks"),
+    *certificates.TABLES,
+)
 LEAKS = ("cell_id", "reached_cell_id", "object_id")
 
 
@@ -255,7 +261,7 @@ def write_bake(
         tables["cell_to_cell"] = _cell_to_cell_table(cell_rows, grid_m)
     tables |= more or {}
 
-    with new_folder(folder, kind="bake") as temporary:
+    with new_folder(folder, "bake", TABLES) as temporary:
         for name, table in tables.items():
             pq.write_table(table, temporary / f"{name}.parquet", compression="zstd")
         final = manifest()

@@ -8,7 +8,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,6 +22,8 @@ from .scene_tables import TABLE_COLUMNS, meshes_table, objects_table, openings_t
 FORMAT = 1
 # Of bakes with view cells that are prisms: who reads them as boxes would claim too much.
 PLAN_FORMAT = 2
+# A folder that is being written is .NAME.writing.XXXX beside it; the one that it replaces is that with .old after it.
+WRITING, OLD = ".writing.", ".old"
 MANIFEST_KEYS = ("format", "kind", "origin", "grid_m", "unit", "source", "sha256", "skipped", "counts", "complete")
 
 
@@ -42,7 +44,7 @@ def write_scene(scene: Scene, folder: str | Path) -> None:
         "openings": openings_table(scene.openings),
     }
     manifest = scene_manifest(scene) | {"kind": "scene", "complete": True}
-    with new_folder(folder, kind="scene") as temporary:
+    with new_folder(folder, "scene", TABLE_COLUMNS) as temporary:
         for name, table in tables.items():
             pq.write_table(table, temporary / f"{name}.parquet", compression="zstd")
         (temporary / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
@@ -134,8 +136,15 @@ def read_table(path: Path, columns: tuple[str, ...]) -> pa.Table:
 
 
 @contextmanager
-def new_folder(folder: str | Path, kind: str) -> Iterator[Path]:
+def new_folder(folder: str | Path, kind: str, tables: Iterable[str]) -> Iterator[Path]:
     """A temporary folder beside `folder` that takes its place when the block ends well, and vanishes when it does not.
+
+    Files and folders that were in `folder` and are none of this kind's own, such as notes of a user, stay in it.
+
+    Args:
+        folder: to make.
+        kind: as its manifest says it.
+        tables: names of all tables that a folder of this kind may hold.
 
     Raises:
         InputError: `folder` is there but no folder of this kind, or writing failed (a full disk, no permission).
@@ -146,9 +155,11 @@ def new_folder(folder: str | Path, kind: str) -> Iterator[Path]:
     temporary = None
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}{WRITING}", dir=folder.parent))
         temporary.chmod(0o755)
         yield temporary
+        if folder.exists():
+            _keep_others(folder, temporary, {"manifest.json", *(f"{name}.parquet" for name in tables)})
         _replace(temporary, folder)
     except OSError as error:
         raise InputError(f"{folder}: expected to be able to write there, found {one_line(error)}") from None
@@ -157,11 +168,22 @@ def new_folder(folder: str | Path, kind: str) -> Iterator[Path]:
             shutil.rmtree(temporary, ignore_errors=True)
 
 
+def _keep_others(old: Path, new: Path, own: set[str]) -> None:
+    """Put what is in the old folder and not its own, nor made anew, into the new one too: nothing is lost meanwhile."""
+    for part in old.iterdir():
+        if part.name in own or (new / part.name).exists():
+            continue
+        if part.is_dir() and not part.is_symlink():
+            shutil.copytree(part, new / part.name, symlinks=True)
+        else:
+            shutil.copy2(part, new / part.name, follow_symlinks=False)
+
+
 def _replace(temporary: Path, folder: Path) -> None:
     if not folder.exists():
         os.rename(temporary, folder)
         return
-    old = temporary.with_name(temporary.name + ".old")
+    old = temporary.with_name(temporary.name + OLD)
     os.rename(folder, old)
     os.rename(temporary, folder)
     shutil.rmtree(old, ignore_errors=True)
@@ -175,6 +197,16 @@ def replaceable(folder: Path, kind: str) -> bool:
         return json.loads((folder / "manifest.json").read_text(encoding="utf-8")).get("kind") == kind
     except (OSError, ValueError, AttributeError):
         return not any(folder.iterdir())
+
+
+def held_manifest(folder: Path, kind: str) -> dict | None:
+    """Manifest of a complete folder of a kind, of any format; None where there is none."""
+    try:
+        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    whole = isinstance(manifest, dict) and manifest.get("kind") == kind and manifest.get("complete")
+    return manifest if whole else None
 
 
 def one_line(error: Exception) -> str:

@@ -1,7 +1,6 @@
 """Visibility block by block: each finished block is kept until all are, so that an interrupted bake resumes."""
 
 import hashlib
-import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,6 +19,8 @@ from .settings import CellSettings
 if TYPE_CHECKING:
     from ...solvers.visibility.engine import Engine, Part
 
+# How the name of a folder of unfinished work ends.
+PARTIAL = ".partial"
 # Sources per block, which an interrupted bake resumes from.
 BLOCK = 24
 # View cells per block: their sets are larger.
@@ -28,27 +29,23 @@ VIEW_BLOCK = 8
 GUESSED = 2.0
 
 
-def partial_folder(out: Path) -> Path:
-    """Where unfinished work of a bake is kept: beside its folder."""
-    return out.with_name(f".{out.name}.partial")
+def partial_folder(out: Path, known: str) -> Path:
+    """Where unfinished work of the bake with a fingerprint is kept: beside its folder, and beside that of others."""
+    return out.with_name(f".{out.name}.{known[:16]}{PARTIAL}")
 
 
 class Store:
     """Finished blocks of an interrupted bake."""
 
-    def __init__(self, folder: Path, known: str) -> None:
-        """Blocks of a bake with another fingerprint are removed.
+    def __init__(self, folder: Path) -> None:
+        """Blocks that are there already are taken.
 
         Raises:
             InputError: the folder cannot be written.
         """
         self._folder = folder
-        mark = folder / "fingerprint"
-        if folder.exists() and (not mark.exists() or mark.read_text() != known):
-            shutil.rmtree(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            mark.write_text(known)
         except OSError as error:
             raise InputError(f"{folder}: expected a place for unfinished work, found: {error.strerror}") from None
 
@@ -106,11 +103,6 @@ class Work:
     deadline: float = np.inf
     started: float = 0.0
 
-    @property
-    def late(self) -> bool:
-        """Whether the deadline has passed."""
-        return time.perf_counter() > self.deadline
-
     def finish(self, name: int | str, block: np.ndarray) -> "Part":
         """A block as far as it goes, from the store if it is there."""
         part = self.store.load(name)
@@ -126,12 +118,12 @@ class Work:
             return [self.finish(number, block) for number, block in enumerate(blocks)], None
         # First what is hidden from each, then witnesses where most is unknown.
         parts, rough, raw = [], [], []
-        first, full = _Rate(), _Rate()
+        first = _Rate()
         for number, block in enumerate(blocks):
             part = self.store.load(number)
             if part is not None:
                 self.bar.update(len(block))
-            elif self.late:
+            elif not first.fits(len(block), self.deadline):
                 raw.append(number)
                 part = self.engine.unknown(block)
             else:
@@ -139,7 +131,9 @@ class Work:
                 part = first.take(len(block), lambda block=block: self.engine.visible(block, aim=False))
             parts.append(part)
         rough.sort(key=lambda number: -parts[number].unknown_count)
-        while rough and not self.late:
+        # Witnesses take as long again where none were looked for yet, or several times so.
+        full = _Rate(guess=GUESSED * first.each)
+        while rough and full.fits(len(blocks[rough[0]]), self.deadline):
             number = rough.pop(0)
             block = blocks[number]
             parts[number] = full.take(len(block), lambda number=number, block=block: self.finish(number, block))
@@ -149,24 +143,27 @@ class Work:
         counts = [sum(len(blocks[number]) for number in numbers) for numbers in (raw, left)]
         needed = None
         if first.cells:
-            # Witnesses take as long again where none were looked for yet, or several times so.
-            each = full.each if full.cells else GUESSED * first.each
-            needed = time.perf_counter() - self.started + counts[0] * first.each + counts[1] * each
+            needed = time.perf_counter() - self.started + counts[0] * first.each + counts[1] * full.each
         pairs = sum(parts[number].unknown_count for number in left)
         return parts, Shortfall("hiding" if raw else "witnesses", counts[1], pairs, needed)
 
 
 @dataclass
 class _Rate:
-    """How long view cells take: how many were done, in how many seconds."""
+    """How long view cells take: how many were done, in how many seconds; and a guess where none was."""
 
     cells: int = 0
     seconds: float = 0.0
+    guess: float = 0.0
 
     @property
     def each(self) -> float:
         """Seconds per view cell."""
-        return self.seconds / self.cells
+        return self.seconds / self.cells if self.cells else self.guess
+
+    def fits(self, cells: int, deadline: float) -> bool:
+        """Whether so many more are done by a deadline, as far as is known."""
+        return time.perf_counter() + cells * self.each <= deadline
 
     def take(self, cells: int, do: "Callable[[], Part]") -> "Part":
         """What `do` returns, timed."""
@@ -208,7 +205,7 @@ def refine(
         work.bar.total += int(alive.sum())
         work.bar.refresh()
         for number, size in enumerate(alive.sum(axis=1)):
-            if work.late:
+            if not rate.fits(1, work.deadline):
                 # What is left of this level stays as it is: unrefined, never hidden.
                 coarse[parents[number:]] = False
                 short = _unrefined(work, parts, parents[number:], rate)

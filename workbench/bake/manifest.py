@@ -57,16 +57,6 @@ def _contents(path: Path) -> bytes:
     return path.read_bytes() if path.is_file() else b""
 
 
-def finished_manifest(out: Path, known: str) -> dict | None:
-    """Manifest of the bake at `out`, if it is complete and of the same fingerprint."""
-    try:
-        manifest = json.loads((out / "manifest.json").read_text())
-    except (OSError, ValueError):
-        return None
-    same = manifest.get("fingerprint") == known and manifest.get("complete") and not manifest.get("budget_spent")
-    return manifest if same else None
-
-
 def rewrite_manifest(folder: Path, manifest: dict) -> None:
     """Put another manifest in the place of a finished bake's."""
     temporary = folder / ".manifest.writing"

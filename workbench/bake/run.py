@@ -18,13 +18,14 @@ from ...data.rows import Rows
 from ...data.scene import Scene
 from ...data.store.bake_folder import CELL_LODS, leaks_table, portals_table, write_bake
 from ...data.store.certificates import certificate_tables, join_proofs
-from ...data.store.scene_folder import replaceable
+from ...data.store.scene_folder import held_manifest
 from ...solvers.levels.pixel_error import pixel_levels
 from ..baked import Bake
 from . import blocks
 from .blocks import Shortfall, Store, Work, in_blocks, partial_folder, refine
 from .cells import Sources, bare_sources, model_sources
-from .manifest import Clock, bake_manifest, fingerprint, finished_manifest, rewrite_manifest
+from .manifest import Clock, bake_manifest, fingerprint, rewrite_manifest
+from .place import check_place, occupied, set_aside
 from .settings import LevelSettings, Settings, check_number
 from .worth import worth
 
@@ -72,11 +73,12 @@ def bake(
         model: a scene, a model file, a scene folder, or a folder with only cells.parquet and portals.parquet.
         out: bake folder to write; by default `<model>.bake` in the current folder.
         settings: what the answer depends on.
-        budget_s: stop after so many seconds of visibility; what is left is unknown, never hidden, and baking again
-            goes on from there.
+        budget_s: stop after so many seconds of visibility, preparing for it included; what is left is unknown, never
+            hidden, and baking again goes on from there.
         threads: CPU threads; all cores by default. The answer does not depend on it.
         device: Warp device. The answer does not depend on it.
-        overwrite: replace a finished bake at `out` even if it is up to date.
+        overwrite: replace a bake at `out`, whatever it is of. Else one of the same model and settings is taken as it
+            is, and any other is left alone. Files of others in that folder stay either way.
         progress: show a progress bar.
         tuned: what `viewcell tune` has found for those who walk through the bake, by name; stored in the manifest.
 
@@ -84,7 +86,8 @@ def bake(
         The bake. Absent rows are hidden, exactly; `unknown` rows are kept.
 
     Raises:
-        InputError: the model, the settings or the place to write are unusable; nothing is written or lost.
+        InputError: the model, the settings or the place to write are unusable, or another bake is there; nothing is
+            written or lost.
     """
     settings = settings or Settings()
     settings.check()
@@ -95,16 +98,18 @@ def bake(
     where = Device.wanted(device, threads)
     out = Path(out) if out is not None else default_out(model)
     clock = Clock()
+    check_place(out, settings, overwrite)
     scene, graph_folder = _open(model, settings)
-    if out.exists() and not replaceable(out, "bake"):
-        raise InputError(f"{out}: expected a new name or a bake folder to replace, found something else there")
     known = fingerprint(scene, graph_folder, settings, (blocks.BLOCK, blocks.VIEW_BLOCK))
-    if not overwrite and (done := finished_manifest(out, known)) is not None:
-        if any(done.get(name) != part for name, part in (tuned or {}).items()):
-            # The tables do not depend on what has been tuned.
-            done |= tuned
-            rewrite_manifest(out, done)
-        return Bake(out, done)
+    if not overwrite and (done := held_manifest(out, "bake")) is not None:
+        if done.get("fingerprint") != known:
+            raise occupied(out, done, settings)
+        if not done.get("budget_spent"):
+            if any(done.get(name) != part for name, part in (tuned or {}).items()):
+                # The tables do not depend on what has been tuned.
+                done |= tuned
+                rewrite_manifest(out, done)
+            return Bake(out, done)
     run = _Run(out, where, budget_s, progress, known, clock)
     notes = {}
     if scene is None:
@@ -183,8 +188,9 @@ def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dic
         return bake_manifest(facts, settings, run.known, graph, (cell_rows, object_rows), clock)
 
     written = write_bake(run.out, manifest, scene, graph, (cell_rows, object_rows), facts["grid_m"], extra)
+    set_aside(run.out / "report")
     if short is None:
-        shutil.rmtree(partial_folder(run.out), ignore_errors=True)
+        shutil.rmtree(partial_folder(run.out, run.known), ignore_errors=True)
     return Bake(run.out, written)
 
 
@@ -234,16 +240,19 @@ def _visibility(
     Cells of an octree are refined on the way: `sources` has them all then.
     """
     clock = run.clock
+    started = time.perf_counter()
     engine = _engine(sources, settings, run.device)
     clock.lap("prepare")
+    compiled = time.perf_counter()
     engine.compile()
+    # Compiling happens once for a machine; preparing is part of every bake.
+    started += time.perf_counter() - compiled
     clock.lap("compile")
     cut = in_blocks(sources)
     total = sum(map(len, cut))
     with tqdm(total=total, unit="cell", desc="visibility", disable=not run.progress) as bar:
-        started = time.perf_counter()
         deadline = np.inf if run.budget_s is None else started + run.budget_s
-        work = Work(engine, Store(partial_folder(run.out), run.known), bar, deadline, started)
+        work = Work(engine, Store(partial_folder(run.out, run.known)), bar, deadline, started)
         parts, short = work.all_parts(cut)
         if sources.octree:
             parts, unrefined = refine(sources, work, parts, settings)

@@ -63,7 +63,7 @@ def write_check(result: CheckResult, folder: str | Path) -> None:
         "notes": result.notes,
         "complete": True,
     }
-    with new_folder(folder, kind="check") as temporary:
+    with new_folder(folder, "check", ("wrong_hidden", "cells")) as temporary:
         pq.write_table(_wrong_table(result), temporary / "wrong_hidden.parquet", compression="zstd")
         pq.write_table(_cells_table(result), temporary / "cells.parquet", compression="zstd")
         (temporary / "manifest.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")

@@ -101,7 +101,8 @@ class _Sweeper:
     """Sweeps over view cells of a model: each is a bake of a table of these cells."""
 
     def __init__(self, bake_: "BakeFolder", chosen: np.ndarray, folder: Path, seed: int) -> None:
-        self._scene, self._folder, self._seed, self._count = bake_.scene, folder, seed, 0
+        # Boxes along the axes of the bake are not along those of a model that was turned back.
+        self._scene, self._folder, self._seed, self._count = replace(bake_.scene, yaw_deg=0.0), folder, seed, 0
         self._boxes = bake_.graph.cells[chosen].astype(np.int64)
 
     def runs(self) -> Iterator[_Run]:

@@ -17,7 +17,7 @@ from viewcell.data.errors import InputError
 from viewcell.data.scene import Role
 from viewcell.verify.exact.sightline import Sight, Sightlines
 from viewcell.verify.rays.witness import visible_rows
-from viewcell.workbench.bake import blocks, manifest
+from viewcell.workbench.bake import blocks, manifest, place
 from viewcell.workbench.bake import run as baking
 from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.baked import load
@@ -167,7 +167,10 @@ def test_a_finished_bake_is_kept_and_a_changed_one_is_not(office, office_bake, t
     stamp = path.stat().st_mtime_ns
     viewcell.bake(office, tmp_path / "office")
     assert path.stat().st_mtime_ns == stamp
-    other = viewcell.bake(office, tmp_path / "office", settings=Settings(seed=5))
+    with pytest.raises(InputError, match="expected a bake of this model with these settings, found one with seed 0;"):
+        viewcell.bake(office, tmp_path / "office", settings=Settings(seed=5))
+    assert path.stat().st_mtime_ns == stamp
+    other = viewcell.bake(office, tmp_path / "office", settings=Settings(seed=5), overwrite=True)
     assert path.stat().st_mtime_ns != stamp and other.manifest["settings"]["seed"] == 5
     assert pairs(load(tmp_path / "office").cell_to_cell, "reached_cell_id") == pairs(
         office_bake.cell_to_cell, "reached_cell_id"
@@ -219,7 +222,7 @@ def small_bake(tmp_path_factory):
 
 @pytest.fixture
 def asked_again(small_bake, tmp_path, monkeypatch):
-    """Whether a bake to where a finished one is begins anew."""
+    """What a bake to where a finished one is comes to: it is kept, refused, or begun anew."""
     out = Path(shutil.copytree(small_bake.folder, tmp_path / "small"))
 
     class BegunError(Exception):
@@ -228,20 +231,26 @@ def asked_again(small_bake, tmp_path, monkeypatch):
     def begin(*_):
         raise BegunError
 
-    def ask(scene, **changes):
+    def ask(scene, overwrite=False, **changes):
         monkeypatch.setattr(baking, "PreparedModel", begin)
+        before = (out / "manifest.json").stat().st_mtime_ns
         try:
-            viewcell.bake(scene, out, settings=Settings(**changes), threads=1)
+            viewcell.bake(scene, out, settings=Settings(**changes), threads=1, overwrite=overwrite)
         except BegunError:
-            return True
-        return False
+            return "begun"
+        except InputError as error:
+            assert "--overwrite" in str(error) and (out / "manifest.json").stat().st_mtime_ns == before
+            return "refused"
+        return "kept"
 
     return ask
 
 
 @pytest.mark.parametrize("part", INGREDIENTS)
 def test_a_bake_of_another_model_is_not_kept(part, asked_again):
-    assert not asked_again(small_scene()) and asked_again(INGREDIENTS[part](small_scene()))
+    other = INGREDIENTS[part](small_scene())
+    assert [asked_again(scene) for scene in (small_scene(), other)] == ["kept", "refused"]
+    assert asked_again(other, overwrite=True) == "begun"
 
 
 OTHER = {
@@ -255,12 +264,14 @@ OTHER = {
 
 @pytest.mark.parametrize("name", [field.name for field in fields(Settings)])
 def test_a_bake_of_other_settings_is_not_kept(name, asked_again):
-    assert asked_again(small_scene(), **{name: OTHER[name]})
+    assert asked_again(small_scene(), **{name: OTHER[name]}) == "refused"
+    assert asked_again(small_scene(), overwrite=True, **{name: OTHER[name]}) == "begun"
 
 
 def test_a_bake_of_another_version_is_not_kept(asked_again, monkeypatch):
     monkeypatch.setattr(manifest, "__version__", "0.0.0-else")
-    assert asked_again(small_scene())
+    monkeypatch.setattr(place, "__version__", "0.0.0-else")
+    assert asked_again(small_scene()) == "refused" and asked_again(small_scene(), overwrite=True) == "begun"
 
 
 @pytest.mark.parametrize("name", ["cells", "portals"])
@@ -271,7 +282,9 @@ def test_a_bake_of_a_graph_that_was_changed_is_not_kept(name, tmp_path):
     assert viewcell.bake(folder, tmp_path / "b", threads=1).manifest == first.manifest
     table = pq.read_table(folder / f"{name}.parquet")
     pq.write_table(table, folder / f"{name}.parquet", compression="none")
-    again = viewcell.bake(folder, tmp_path / "b", threads=1)
+    with pytest.raises(InputError, match="another model, or of an earlier state of it"):
+        viewcell.bake(folder, tmp_path / "b", threads=1)
+    again = viewcell.bake(folder, tmp_path / "b", threads=1, overwrite=True)
     assert again.manifest["fingerprint"] != first.manifest["fingerprint"]
 
 
@@ -280,7 +293,10 @@ def test_a_bake_of_view_cells_that_were_changed_is_not_kept(tmp_path):
     settings = Settings(method="occluders", cells=str(cells))
     for low in (0.25, 0.5):
         cells.write_text(f"min_x,min_y,min_z,max_x,max_y,max_z\n{low},0.5,0.5,0.75,1,1\n")
-        made = viewcell.bake(scene, tmp_path / "b", settings=settings, threads=1)
+        if low == 0.5:
+            with pytest.raises(InputError, match="--overwrite"):
+                viewcell.bake(scene, tmp_path / "b", settings=settings, threads=1)
+        made = viewcell.bake(scene, tmp_path / "b", settings=settings, threads=1, overwrite=low == 0.5)
         assert made.graph.cells[0, 0, 0] == low * METRE
 
 
