@@ -219,7 +219,8 @@ def _hard_cases(options: argparse.Namespace) -> int:
 def check(options: argparse.Namespace) -> int:
     """Check claims of any baker; the exit code says whether something visible was found hidden."""
     _start_warp()
-    from .check.folder import check_place, replay, write_check
+    from ..data.store.scene_folder import refuse_others
+    from .check.folder import replay, write_check
     from .check.run import check as look
 
     if options.replay is not None:
@@ -229,7 +230,7 @@ def check(options: argparse.Namespace) -> int:
     if options.model is None:
         raise InputError("check: expected a model or --replay FOLDER, found neither")
     if options.out:
-        check_place(options.out)
+        refuse_others(options.out, "check")
     result = look(
         options.model,
         options.pvs,

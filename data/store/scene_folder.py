@@ -150,8 +150,7 @@ def new_folder(folder: str | Path, kind: str, tables: Iterable[str]) -> Iterator
         InputError: `folder` is there but no folder of this kind, or writing failed (a full disk, no permission).
     """
     folder = Path(folder)
-    if folder.exists() and not replaceable(folder, kind):
-        raise InputError(f"{folder}: expected a new name or a {kind} folder to replace, found something else there")
+    refuse_others(folder, kind)
     temporary = None
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -189,24 +188,35 @@ def _replace(temporary: Path, folder: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def replaceable(folder: Path, kind: str) -> bool:
-    """Whether a folder may be replaced: it is of this kind, or empty."""
-    if not folder.is_dir():
-        return False
-    try:
-        return json.loads((folder / "manifest.json").read_text(encoding="utf-8")).get("kind") == kind
-    except (OSError, ValueError, AttributeError):
-        return not any(folder.iterdir())
+def refuse_others(folder: str | Path, kind: str) -> None:
+    """Refuse a place that is neither free, nor empty, nor a folder of a kind.
+
+    Raises:
+        InputError: something else is there.
+    """
+    place = Path(folder)
+    if place.exists() and not (place.is_dir() and _replaceable(place, kind)):
+        raise InputError(f"{folder}: expected a new name or a {kind} folder to replace, found something else there")
+
+
+def _replaceable(folder: Path, kind: str) -> bool:
+    manifest = _manifest_of(folder)
+    return not any(folder.iterdir()) if manifest is None else manifest.get("kind") == kind
 
 
 def held_manifest(folder: Path, kind: str) -> dict | None:
     """Manifest of a complete folder of a kind, of any format; None where there is none."""
+    manifest = _manifest_of(folder) or {}
+    return manifest if manifest.get("kind") == kind and manifest.get("complete") else None
+
+
+def _manifest_of(folder: Path) -> dict | None:
+    """What a folder's manifest says, whatever it is of; None where none can be read."""
     try:
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    whole = isinstance(manifest, dict) and manifest.get("kind") == kind and manifest.get("complete")
-    return manifest if whole else None
+    return manifest if isinstance(manifest, dict) else None
 
 
 def one_line(error: Exception) -> str:

@@ -105,3 +105,9 @@ def scene_of(parts, rooms=()):
         corners = (np.array(low) + UNIT_BOX * (np.array(high) - np.array(low))) * GRID_M
         spaces.append(Space(f"room {number}", corners, BOX_FACES))
     return Scene(definitions, objects, spaces)
+
+
+def two_solids():
+    """Two solids and a room between them."""
+    parts = [([0, 0, 0], [99, 2000, 2000]), ([999, 0, 0], [1999] * 3)]
+    return scene_of([(box_triangles(*part), "occluder") for part in parts], [((100, 0, 0), (999, 1999, 1999))])

@@ -33,8 +33,8 @@ class Clock:
 def fingerprint(scene: Scene | None, graph_folder: Path | None, settings: Settings, block_sizes: tuple) -> str:
     """Hash of everything that the answer depends on, and of how it is cut into blocks."""
     digest = hashlib.sha256(f"{__version__} {settings} {block_sizes}".encode())
-    if settings.cells not in ("", "portals", "octree"):
-        digest.update(_contents(Path(settings.cells)))
+    if settings.table is not None:
+        digest.update(_contents(settings.table))
     if scene is None:
         for name in ("cells.parquet", "portals.parquet"):
             digest.update(_contents(graph_folder / name))

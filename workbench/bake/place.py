@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ... import __version__
 from ...data.errors import InputError
-from ...data.store.scene_folder import OLD, WRITING, held_manifest, replaceable
+from ...data.store.scene_folder import OLD, WRITING, held_manifest, refuse_others
 from .blocks import PARTIAL
 from .settings import Settings
 
@@ -21,9 +21,8 @@ def check_place(out: Path, settings: Settings, overwrite: bool) -> None:
         InputError: `out` holds something else, or a bake with other settings, or cannot be written; or a table of view
             cells is not there.
     """
-    if out.exists() and not replaceable(out, "bake"):
-        raise InputError(f"{out}: expected a new name or a bake folder to replace, found something else there")
-    if settings.cells not in ("", "portals", "octree") and not Path(settings.cells).is_file():
+    refuse_others(out, "bake")
+    if settings.table is not None and not settings.table.is_file():
         raise InputError(f"{settings.cells}: expected a table of view cells, portals or octree, found nothing there")
     parent = out.absolute().parent
     while not parent.exists():

@@ -1,6 +1,7 @@
 """What a bake's answer depends on, in groups by what they speak of."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,6 +76,11 @@ class CellSettings:
     refine_gap: float = 0.25
     largest_cell: float = 0.0
     refine_kept: float = 0.0
+
+    @property
+    def table(self) -> Path | None:
+        """The table of boxes that `cells` names, if it names one."""
+        return None if self.cells in ("", "portals", "octree") else Path(self.cells)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from ...data.scene import OPAQUE, Role
 from ...data.store.bake_folder import WITNESS
 from ...data.store.graph_folder import CELL_COLUMNS, numbers
 from ...data.store.quake import axial_graph, read_prt
-from ...data.store.scene_folder import FORMAT, new_folder, read_manifest, read_table, replaceable
+from ...data.store.scene_folder import FORMAT, new_folder, read_manifest, read_table
 from ...data.view_cells import as_graph
 from ...verify.check_result import CheckResult
 from ...verify.exact.sightline import Sightlines
@@ -29,16 +29,6 @@ from ...verify.rays.witness import Witnesses, confirm_cells
 from .run import open_model
 
 WRONG = ("kind", "cell", "target", *WITNESS, "portals")
-
-
-def check_place(folder: str | Path) -> None:
-    """Refuse a place that holds something else, before the work.
-
-    Raises:
-        InputError: it is neither free nor the folder of an earlier check.
-    """
-    if Path(folder).exists() and not replaceable(Path(folder), "check"):
-        raise InputError(f"{folder}: expected a new name or a check folder to replace, found something else there")
 
 
 def write_check(result: CheckResult, folder: str | Path) -> None:

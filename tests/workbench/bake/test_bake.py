@@ -179,9 +179,7 @@ def test_a_finished_bake_is_kept_and_a_changed_one_is_not(office, office_bake, t
 
 def small_scene():
     """Two solids, a room and a hole."""
-    boxes = [(box(low, high), "occluder") for low, high in (((0, 0, 0), (99, 2000, 2000)), ((999, 0, 0), (1999,) * 3))]
-    scene = scene_of(boxes, [((100, 0, 0), (999, 1999, 1999))])
-    return replace(scene, openings=np.array([[[0.0, 0.5, 0.5], [0.1, 1.0, 1.0]]]))
+    return replace(random_buildings.two_solids(), openings=np.array([[[0.0, 0.5, 0.5], [0.1, 1.0, 1.0]]]))
 
 
 def with_mesh(scene, **changes):

@@ -5,8 +5,7 @@ import os
 
 import pytest
 import viewcell
-from builders.random_buildings import box_triangles as box
-from builders.random_buildings import scene_of
+from builders.random_buildings import two_solids
 from viewcell.data.errors import InputError
 from viewcell.data.store.scene_folder import write_scene
 from viewcell.workbench.bake import run
@@ -15,19 +14,13 @@ from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.cli import main
 
 
-def small_scene():
-    """Two solids and a room between."""
-    boxes = [(box(low, high), "occluder") for low, high in (((0, 0, 0), (99, 2000, 2000)), ((999, 0, 0), (1999,) * 3))]
-    return scene_of(boxes, [((100, 0, 0), (999, 1999, 1999))])
-
-
 @pytest.fixture
 def made(tmp_path):
-    return viewcell.bake(small_scene(), tmp_path / "a.bake", settings=Settings(certify=True), threads=1)
+    return viewcell.bake(two_solids(), tmp_path / "a.bake", settings=Settings(certify=True), threads=1)
 
 
 def again(made, **settings):
-    return viewcell.bake(small_scene(), made.folder, settings=Settings(**settings), threads=1, overwrite=True)
+    return viewcell.bake(two_solids(), made.folder, settings=Settings(**settings), threads=1, overwrite=True)
 
 
 def test_files_of_others_survive_and_tables_of_before_do_not(made):
@@ -55,9 +48,9 @@ def test_a_report_of_the_bake_before_is_set_aside(made):
 
 
 def test_a_scene_folder_keeps_what_is_not_its_own(tmp_path):
-    write_scene(small_scene(), tmp_path / "a.scene")
+    write_scene(two_solids(), tmp_path / "a.scene")
     (tmp_path / "a.scene" / "notes.txt").write_text("mine")
-    write_scene(small_scene(), tmp_path / "a.scene")
+    write_scene(two_solids(), tmp_path / "a.scene")
     assert (tmp_path / "a.scene" / "notes.txt").read_text() == "mine"
 
 
@@ -65,7 +58,7 @@ def test_a_scene_folder_keeps_what_is_not_its_own(tmp_path):
 def test_what_must_fail_fails_before_the_model_is_read(what, tmp_path, monkeypatch):
     out, settings = tmp_path / "a.bake", Settings()
     if what == "settings":
-        viewcell.bake(small_scene(), out, settings=Settings(seed=3), threads=1)
+        viewcell.bake(two_solids(), out, settings=Settings(seed=3), threads=1)
     if what == "cells":
         settings = Settings(cells=str(tmp_path / "none.csv"))
     if what == "place":
@@ -86,7 +79,7 @@ def test_what_differs_is_named(made):
         (Settings(seed=7, method="both"), "with method 'auto', certify True, seed 0"),
         (Settings(certify=True), "of another model, or of an earlier state of it"),
     ):
-        scene = small_scene()
+        scene = two_solids()
         scene.objects.reverse()
         with pytest.raises(InputError) as told:
             viewcell.bake(scene, made.folder, settings=settings, threads=1)
@@ -94,7 +87,7 @@ def test_what_differs_is_named(made):
 
 
 def test_unfinished_work_is_named_and_cleaned(tmp_path, monkeypatch, capsys):
-    write_scene(small_scene(), tmp_path / "a.scene")
+    write_scene(two_solids(), tmp_path / "a.scene")
     monkeypatch.chdir(tmp_path)
     assert main(["bake", "a.scene", "--budget", "1e-6", "--no-progress"]) == 0
     (left,) = leftovers(tmp_path)
