@@ -46,6 +46,7 @@ class CheckResult:
         object_names: names of the model's objects.
         claimed: by kind of target, shape (cells, targets), bool.
         seen: the same of pairs that some sightline of this check joined.
+        silent: view cells of which no pair of cells is claimed or judged, shape (cells,); see `Claims.silent`.
         wrong: wrong-hidden pairs.
         exact: whether every pair was decided by exact arithmetic, as in an axial cell graph, and not by sampling.
         statement: how sure the answer is, where `confidence` does not apply.
@@ -69,6 +70,7 @@ class CheckResult:
     object_names: list[str]
     claimed: dict[str, np.ndarray]
     seen: dict[str, np.ndarray]
+    silent: np.ndarray | None = None
     wrong: list[WrongPair] = field(default_factory=list)
     exact: bool = False
     statement: str = ""
@@ -99,6 +101,8 @@ class CheckResult:
     def by_cell(self, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Claimed pairs, claimed pairs that were seen, and wrong-hidden pairs of each source, each shape (sources,)."""
         claimed, seen = self.claimed[kind][self.sources], self.seen[kind][self.sources]
+        if kind == "cell" and self.silent is not None:
+            claimed = claimed & ~self.silent[self.sources, None] & ~self.silent
         wrong = np.bincount([w.cell for w in self.wrong if w.kind == kind], minlength=len(self.cell_ids))
         return claimed.sum(axis=1), (claimed & seen).sum(axis=1), wrong[self.sources]
 

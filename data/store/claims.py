@@ -28,10 +28,13 @@ class Claims:
     Attributes:
         objects: shape (cells, objects), bool; None if nothing is claimed of objects.
         cells: shape (cells, cells), bool, each cell in its own set; None if nothing is claimed of cells.
+        silent: cells with a plan that no claim of cells names, shape (cells,), bool: a bake speaks only of what
+            objects are seen from these, so all their pairs stand in `cells` as claimed; None where `cells` is.
     """
 
     objects: np.ndarray | None = None
     cells: np.ndarray | None = None
+    silent: np.ndarray | None = None
 
 
 def read_claims(
@@ -61,7 +64,7 @@ def read_claims(
         raise InputError(f"targets: expected objects or cells, found {targets!r}")
     claims = Claims()
     for source in sources:
-        for where, part in _open(source):
+        for where, part in _open(source, view):
             if isinstance(part, np.ndarray):
                 kind, matrix = _from_matrix(part, view, len(object_names), targets, where)
             else:
@@ -72,12 +75,14 @@ def read_claims(
     if claims.objects is None and claims.cells is None:
         raise InputError("pvs: expected claims of objects or of cells, found none")
     if claims.cells is not None:
+        claims.silent = view.planned & ~claims.cells.any(axis=0) & ~claims.cells.any(axis=1)
+        claims.cells[claims.silent], claims.cells[:, claims.silent] = True, True
         # A view cell sees itself; few bakers say so.
         np.fill_diagonal(claims.cells, True)
     return claims
 
 
-def _open(source: object) -> list[tuple[str, pa.Table | np.ndarray]]:
+def _open(source: object, view: ViewCells) -> list[tuple[str, pa.Table | np.ndarray]]:
     """What to call each table of a source, and the table."""
     if isinstance(source, np.ndarray):
         return [("pvs", source)]
@@ -90,7 +95,9 @@ def _open(source: object) -> list[tuple[str, pa.Table | np.ndarray]]:
     if path.is_dir():
         manifest = read_manifest(path, kind="bake")
         names = ["cell_to_object"] if manifest.get("counts", {}).get("objects") else []
-        names += ["cell_to_cell"] if "cell_to_cell" in manifest.get("claims", ["cell_to_cell"]) else []
+        # A bake claims nothing of cells from those with a plan, and all of its view cells may be such.
+        of_cells = "cell_to_cell" in manifest.get("claims", ["cell_to_cell"])
+        names += ["cell_to_cell"] if of_cells and view.graph.inhabitable[~view.planned].any() else []
         return [(str(path / f"{name}.parquet"), read_rows(path / f"{name}.parquet")) for name in names]
     if path.suffix.lower() == ".npy":
         try:

@@ -31,10 +31,12 @@ class ViewCells:
     Attributes:
         graph: a graph without portals.
         ids: of each cell, shape (cells,), int64 or str.
+        planned: cells whose table gives them a plan, shape (cells,), bool.
     """
 
     graph: CellGraph
     ids: np.ndarray
+    planned: np.ndarray
 
 
 def write_view_cells(boxes: np.ndarray, scene: Scene, path: str | Path) -> None:
@@ -99,6 +101,7 @@ def view_cells(
     origin, yaw_deg = placement or (np.zeros(3), 0.0)
     ids = _cell_ids(table, where)
     prisms = _corners(table, boxes, where)
+    planned = np.isin(np.arange(len(boxes)), list(prisms))
     if yaw_deg == scene.yaw_deg:
         # The same frame, possibly from another place in it.
         shift = turned(scene.origin - origin, -yaw_deg)
@@ -129,7 +132,7 @@ def view_cells(
             f"{where}: expected view cells within {AROUND_M:g} m of the model, found cell {ids[away[0]]} outside"
         )
     graph = as_graph(cells, optional_column(table, "name", ""), inhabitable_column(table, where), plans)
-    return ViewCells(graph, ids)
+    return ViewCells(graph, ids, planned)
 
 
 def _corners(table: pa.Table, boxes: np.ndarray, where: str) -> dict[int, np.ndarray]:

@@ -34,7 +34,7 @@ def check_graph(graph: CellGraph, pvs: Sequence[object], targets: str | None = N
         InputError: the claims are unusable, or speak of objects.
     """
     start = time.perf_counter()
-    view = ViewCells(graph, np.arange(graph.cell_count))
+    view = ViewCells(graph, np.arange(graph.cell_count), np.zeros(graph.cell_count, bool))
     claims = read_claims(pvs, view, [], targets)
     seconds = {"read": time.perf_counter() - start}
     with tempfile.TemporaryDirectory() as scratch:

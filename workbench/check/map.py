@@ -95,7 +95,9 @@ def _follow_lines(
     """Sampled lines through the windings, and a rational second look at each suspect."""
     count = portals.leaf_count
     boxes = np.tile(np.array([[0], [1]], np.int32), (count, 1, 3))
-    claimed = read_claims(claims, ViewCells(as_graph(boxes), np.arange(count)), [], targets).cells
+    claimed = read_claims(
+        claims, ViewCells(as_graph(boxes), np.arange(count), np.zeros(count, bool)), [], targets
+    ).cells
     settled, each = claimed.copy(), -(-rays // count)
     # A leaf sees itself; lines begin where they leave it.
     seen = np.eye(count, dtype=bool)

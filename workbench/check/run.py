@@ -243,12 +243,16 @@ class _Hunt:
             object_names=[placed.name for placed in scene.objects],
             claimed=claimed,
             seen={kind: np.zeros_like(matrix) for kind, matrix in claimed.items()},
+            silent=claims.silent,
             grid_m=scene.grid_m,
             origin=scene.origin,
             yaw_deg=scene.yaw_deg,
             snap_m=scene.max_snap_m(),
             boxes=graph.cells,
         )
+        if claims.silent is not None and claims.silent.any():
+            cells = counted(int(claims.silent.sum()), "view cell")
+            self.result.notes.append(f"{cells} at an angle: claims of objects only, so none of their cells were judged")
         # Pairs that no suspect is wanted of: claimed, or found wrong already.
         self.settled = {kind: matrix.copy() for kind, matrix in claimed.items()}
 

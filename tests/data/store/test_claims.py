@@ -10,13 +10,14 @@ from viewcell.data.view_cells import as_graph
 
 NAMES = ["table", "chair", "chair", "lamp", "12"]
 BOXES = np.array([[[k, 0, 0], [k + 1, 1, 1]] for k in range(3)])
+NO_PLAN = np.zeros(3, bool)
 PAIRS = [(10, 0), (10, 3), (30, 2)]
 
 
 @pytest.fixture
 def view():
     names = np.array(["hall", "kitchen", "attic"], object)
-    return ViewCells(as_graph(BOXES, names), np.array([10, 20, 30]))
+    return ViewCells(as_graph(BOXES, names), np.array([10, 20, 30]), NO_PLAN)
 
 
 def table(pairs=PAIRS, target="object_id", **more):
@@ -42,7 +43,7 @@ def test_names_stand_for_ids(view):
 
 
 def test_text_ids_come_before_names():
-    view = ViewCells(as_graph(BOXES), np.array(["a", "b", "c"], object))
+    view = ViewCells(as_graph(BOXES), np.array(["a", "b", "c"], object), NO_PLAN)
     claims = read_claims([table([("c", "lamp")])], view, NAMES)
     assert np.argwhere(claims.objects).tolist() == [[2, 3]]
 
@@ -149,8 +150,23 @@ def test_bad_files_are_refused(view, tmp_path):
 def test_claims_come_once_and_of_inhabitable_cells(view):
     with pytest.raises(InputError, match="once, found them a second time"):
         read_claims([table(), table()], view, NAMES)
-    closed = ViewCells(as_graph(BOXES, inhabitable=np.array([False, True, True])), view.ids)
+    closed = ViewCells(as_graph(BOXES, inhabitable=np.array([False, True, True])), view.ids, NO_PLAN)
     with pytest.raises(InputError, match="expected rows of inhabitable cells only, found cell 10"):
         read_claims([table()], closed, NAMES)
     with pytest.raises(InputError, match="found none"):
         read_claims([], view, NAMES)
+
+
+def test_a_planned_cell_that_no_row_names_is_silent(view):
+    view = ViewCells(view.graph, view.ids, np.array([False, True, True]))
+    of_one = {"cell_id": [10], "reached_cell_id": [30]}
+    claims = read_claims([of_one], view, NAMES)
+    assert claims.silent.tolist() == [False, True, False]
+    assert claims.cells.tolist() == [[True, True, True], [True] * 3, [False, True, True]]
+    # A cell without a plan that no row names is claimed to see nothing, and so is one of a matrix's rows.
+    claims = read_claims([{"cell_id": [30], "reached_cell_id": [20]}], view, NAMES)
+    assert not claims.silent.any() and claims.cells.tolist() == [
+        [True, False, False],
+        [False, True, False],
+        [False, True, True],
+    ]

@@ -11,7 +11,7 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 import pytest
 import viewcell
-from builders import four_rooms, small_house
+from builders import four_rooms, small_house, turned_house
 from scipy.spatial import cKDTree
 from viewcell import InputError
 from viewcell.data.scene import Role
@@ -28,6 +28,7 @@ from viewcell.verify.rays.free_space import FreeSpace
 from viewcell.verify.rays.second_look import SecondLook
 from viewcell.verify.rays.targets import Targets
 from viewcell.workbench.bake.run import bake
+from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.check.run import _Hunt, assert_conservative, check
 from viewcell.workbench.cli import main
 
@@ -431,3 +432,27 @@ def test_plugin(tmp_path, house, claims):
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert done.returncode == code, done.stdout + done.stderr
     assert "not conservative: 1 visible pair claimed hidden" in done.stdout and "sees object" in done.stdout
+
+
+def test_a_bake_of_prisms_alone_stands_by_its_claims_of_objects(tmp_path):
+    baked = turned_house.turned_bake(tmp_path / "turned.bake")
+    result = check(baked.scene, baked.folder, baked.folder, rays=RAYS)
+    assert result.ok and result.rays and list(result.claimed) == ["object"]
+
+
+@pytest.mark.slow
+def test_a_bake_with_prisms_stands_by_its_claims_of_cells(tmp_path):
+    """Nothing is claimed of which cells a prism sees, so none of them is judged; its objects are."""
+    scene = viewcell.make_office(floors=1, rooms_per_side=1, wings=2, wing_angle_deg=30)
+    baked = bake(scene, tmp_path / "wings.bake", settings=Settings(yaw="0"), threads=2)
+    planned = np.flatnonzero(np.arange(baked.graph.cell_count) >= baked.graph.tile_count)
+    result = check(scene, baked.folder, baked.folder, rays=RAYS)
+    assert result.ok and len(planned) and np.flatnonzero(result.silent).tolist() == planned.tolist()
+    assert f"note: {len(planned)} view cells at an angle" in result.table()
+    assert result.by_cell("cell")[0].sum() == baked.cell_to_cell.num_rows
+
+    cell, target = planned[0], int(baked.seen(planned[0])[0])
+    pairs = baked.cell_to_object
+    rows = (pairs["cell_id"].to_numpy() != cell) | (pairs["object_id"].to_numpy() != target)
+    told = check(scene, pairs.filter(pa.array(rows)), baked.folder, rays=RAYS)
+    assert [(wrong.cell, wrong.target) for wrong in told.wrong] == [(cell, target)]
