@@ -59,7 +59,7 @@ def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float) 
         quads = _sections(triangles, least, THIN_M / grid_m)
         if not len(quads):
             continue
-        quads = quads[_inside(quads, triangles)]
+        quads = quads[inside(quads, triangles)]
         for part in [*_pieces(quads, PIECE_M / grid_m), *_tips(quads, triangles)]:
             _add(boxes, kinds, part)
     _add(boxes, kinds, _upright_faces(faces, least))
@@ -108,20 +108,9 @@ def _sections(triangles: np.ndarray, least: float, thin: float) -> np.ndarray:
     for yaw, depths in _directions(triangles, least):
         level = np.round(turned(triangles.astype(float), -yaw)).astype(np.int64)
         low, high = level[:, :, 0].min(axis=1), level[:, :, 0].max(axis=1)
-        for depth in _cuts(depths, int(low.min()), int(high.max()), thin):
-            cut = level[(low < depth) & (high >= depth)]
-            if not len(cut):
-                continue
-            rectangles = section_rectangles(cut, 0, depth, below=True)
-            if not len(rectangles):
-                continue
-            us, vs = np.unique(rectangles[:, :, 0]), np.unique(rectangles[:, :, 1])
-            solid = paint(rectangles, us, vs)
-            largest = maximal_rectangles(solid, solid, us, vs).astype(np.int64)
+        for depth in cuts_inside(depths, int(low.min()), int(high.max()), thin):
             # Where the element's own coordinates are rounded into this frame a section may touch its border.
-            largest[:, :, 0] += np.array([ENDS, -ENDS])
-            size = largest[:, 1] - largest[:, 0]
-            largest = largest[(size[:, 0] > 0) & (size[:, 0] * size[:, 1] >= least)]
+            largest = largest_sections(level[(low < depth) & (high >= depth)], 0, depth, (ENDS, 0), least)
             corners = np.concatenate([np.full((len(largest), 2, 1), depth), largest], axis=2)
             quads.append(np.round(turned(corners.astype(float), yaw)).astype(np.int64))
     found = np.concatenate(quads)
@@ -131,7 +120,34 @@ def _sections(triangles: np.ndarray, least: float, thin: float) -> np.ndarray:
     return np.unique(found, axis=0)
 
 
-def _cuts(depths: np.ndarray, low: int, high: int, thin: float) -> list[int]:
+def largest_sections(
+    cut: np.ndarray, axis: int, k: int, ends: tuple[int, int], least: float, *, below: bool = True
+) -> np.ndarray:
+    """The largest rectangles inside the section of a closed surface by a plane, as `section_rectangles` takes it.
+
+    Args:
+        cut: its triangles that reach over the plane [grid steps], shape (m, 3, 3), int.
+        axis: perpendicular to the plane.
+        k: coordinate of the plane.
+        ends: what each rectangle is cut short by, on both of its ends, along u and v [grid steps].
+        least: smaller ones are left out [squared grid steps].
+        below: section just below the plane, or just above it.
+
+    Returns:
+        Shape (n, 2, 2), int64, overlapping.
+    """
+    rectangles = section_rectangles(cut, axis, k, below=below) if len(cut) else np.zeros((0, 2, 2), np.int64)
+    if not len(rectangles):
+        return rectangles
+    us, vs = np.unique(rectangles[:, :, 0]), np.unique(rectangles[:, :, 1])
+    solid = paint(rectangles, us, vs)
+    largest = maximal_rectangles(solid, solid, us, vs).astype(np.int64)
+    largest += np.array([ends, ends]) * np.array([[1], [-1]])
+    size = largest[:, 1] - largest[:, 0]
+    return largest[(size > 0).all(axis=1) & (size.prod(axis=1) >= least)]
+
+
+def cuts_inside(depths: np.ndarray, low: int, high: int, thin: float, recess: int = RECESS) -> list[int]:
     """Where to cut an element whose faces lie at some depths: just inside of each, and midway where it is thin."""
     planes = np.unique(np.concatenate([[low], np.round(depths).astype(int), [high]]))
     planes = planes[np.append(True, np.diff(planes) > 2)]
@@ -139,8 +155,8 @@ def _cuts(depths: np.ndarray, low: int, high: int, thin: float) -> list[int]:
     for a, b in zip(planes[:-1].tolist(), planes[1:].tolist(), strict=True):
         if b - a < thin:
             cuts.add((a + b) // 2)
-        if b - a > 4 * RECESS:
-            cuts |= {a + RECESS, b - RECESS}
+        if b - a > 4 * recess:
+            cuts |= {a + recess, b - recess}
     return sorted(cuts)
 
 
@@ -163,11 +179,14 @@ def _pieces(quads: np.ndarray, least: float) -> list[np.ndarray]:
     return found
 
 
-def _inside(quads: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Rectangles inside a closed surface none of whose triangles comes within CLEAR_STEPS, shape (n,), bool."""
+def inside(quads: np.ndarray, triangles: np.ndarray, margin: float = CLEAR_STEPS) -> np.ndarray:
+    """Rectangles inside a closed surface none of whose triangles comes within a margin of them, shape (n,), bool.
+
+    Arguments as of `meeting`.
+    """
     held = np.abs(winding_numbers(quads.mean(axis=1), triangles)) > 0.5
     rows = np.flatnonzero(held)
-    held[rows[meeting(quads[rows], triangles, CLEAR_STEPS)[0]]] = False
+    held[rows[meeting(quads[rows], triangles, margin)[0]]] = False
     return held
 
 

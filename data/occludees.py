@@ -11,12 +11,13 @@ from itertools import product
 
 import numpy as np
 
+from .exposed import UprightFace, face_pieces
 from .frame import wall_yaw
 from .hierarchy import build_levels
 from .incidence import CHUNK, clip_bounds
-from .plans import Plans, are_convex, box_corners, plan_bounds, turned_plan
+from .plans import NO_PLANS, Plans, are_convex, box_corners, plan_bounds, turned_plan
 from .ragged import owners_of, places_of
-from .scene import Scene, turned
+from .scene import GRID_LIMIT, Scene, turned
 
 # Pieces are no smaller than this, and at most PIECES along an axis of their object.
 PIECE_M = 1.0
@@ -60,16 +61,46 @@ class Occludees:
         return owners_of(self.starts)
 
 
-def find_occludees(scene: Scene) -> Occludees:
-    """Occludees of all objects of a scene, opaque or not."""
+def find_occludees(scene: Scene, exposed: dict[int, list[UprightFace]] | None = None) -> Occludees:
+    """Occludees of all objects of a scene, opaque or not.
+
+    Args:
+        scene: the model.
+        exposed: of objects some of whose upright faces nobody can see, the others, as of `exposed_faces`: only these
+            and the level ones are put into pieces, each face for itself. None by default.
+    """
     bounds = scene.object_bounds()
     present = np.flatnonzero((bounds[:, 0] <= bounds[:, 1]).all(axis=1))
     levels, objects = build_levels(bounds[present])
     # An empty node's -1 takes the last entry: -1.
     objects = np.append(present, -1)[objects].astype(np.int32)
     pieces, plans, owner = _pieces(scene, bounds)
+    if exposed:
+        pieces, plans, owner = _face_by_face(scene, exposed, pieces, plans, owner)
     starts = np.searchsorted(owner, np.arange(len(bounds) + 1))
     return Occludees(bounds.astype(np.int32), levels, objects, pieces, plans, starts)
+
+
+def turned_occludees(scene: Scene, yaw_deg: float) -> Occludees:
+    """Occludees of a scene in a frame that stands at an angle in its own, all in boxes, on that frame's grid.
+
+    Boxes are rounded outwards: a line that meets the object meets its box. Triangles without area in the frame count.
+    """
+    triangles, owners = scene.triangles()
+    level = np.round(turned(triangles.astype(float), -yaw_deg)).astype(np.int64)
+    count, rounded = len(scene.objects), np.array([[-1, -1, 0], [1, 1, 0]])
+    bounds = np.empty((count, 2, 3), np.int64)
+    bounds[:, 0], bounds[:, 1] = GRID_LIMIT, -GRID_LIMIT
+    np.minimum.at(bounds[:, 0], owners, level.min(axis=1))
+    np.maximum.at(bounds[:, 1], owners, level.max(axis=1))
+    pieces, owner = _cut(level, owners, bounds, round(PIECE_M / scene.grid_m))
+    present = np.flatnonzero((bounds[:, 0] <= bounds[:, 1]).all(axis=1))
+    bounds[present] += rounded
+    levels, objects = build_levels(bounds[present])
+    objects = np.append(present, -1)[objects].astype(np.int32)
+    starts = np.searchsorted(owner, np.arange(count + 1))
+    pieces = (pieces + rounded).astype(np.int32)
+    return Occludees(bounds.astype(np.int32), levels, objects, pieces, NO_PLANS, starts)
 
 
 def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, Plans, np.ndarray]:
@@ -106,6 +137,43 @@ def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, Plans, np.nda
     rows = np.flatnonzero(place[row] >= 0)
     plans = corners[place[row[rows]], :, :2] + shift[rows, None, :2]
     return (boxes[row] + shift[:, None]).astype(np.int32), Plans(rows, plans.astype(np.int32)), objects
+
+
+def _face_by_face(
+    scene: Scene, exposed: dict[int, list[UprightFace]], pieces: np.ndarray, plans: Plans, owner: np.ndarray
+) -> tuple[np.ndarray, Plans, np.ndarray]:
+    """Pieces, plans and owners as of `_pieces`, with those of some objects replaced by pieces of their faces."""
+    least, starts, triangles = round(PIECE_M / scene.grid_m), scene.triangle_starts, scene.triangles()[0]
+    kept = ~np.isin(owner, list(exposed))
+    place = plans.places(len(pieces))[kept]
+    boxes, corners = [pieces[kept]], [plans.corners[place[place >= 0]]]
+    owners, planned = [owner[kept]], [place >= 0]
+    for object_id, faces in exposed.items():
+        own = triangles[starts[object_id] : starts[object_id + 1]]
+        level = own[np.ptp(own[:, :, 2], axis=1) == 0]
+        yaw = _yaws(own, np.zeros(len(own), np.int64), 1)
+        found = [face_pieces(face, 2 * least) for face in faces]
+        prisms = [corner for _, corner in found]
+        if yaw[0]:
+            prisms.append(_cut_turned(level, np.zeros(len(level), np.int64), yaw, least)[0])
+            flat = np.zeros((0, 2, 3), np.int64)
+        else:
+            flat, _ = _cut(
+                level, np.zeros(len(level), np.int64), np.array([[own.min(axis=(0, 1)), own.max(axis=(0, 1))]]), least
+            )
+        prisms = np.concatenate(prisms)
+        around = np.stack([prisms.min(axis=1), prisms.max(axis=1)], axis=1)
+        boxes += [*(box for box, _ in found), flat, around]
+        corners.append(prisms[:, :, :2])
+        plain = sum(len(box) for box, _ in found) + len(flat)
+        planned.append(np.arange(plain + len(prisms)) >= plain)
+        owners.append(np.full(plain + len(prisms), object_id))
+    boxes, corners = np.concatenate(boxes).astype(np.int32), np.concatenate(corners).astype(np.int32)
+    planned, owners = np.concatenate(planned), np.concatenate(owners)
+    place = np.where(planned, np.cumsum(planned) - 1, -1)
+    order = np.argsort(owners, kind="stable")
+    rows = np.flatnonzero(place[order] >= 0)
+    return boxes[order], Plans(rows, corners[place[order][rows]]), owners[order]
 
 
 def _yaws(triangles: np.ndarray, owners: np.ndarray, count: int) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 
 from .blockers import Blockers, find_blockers, join_blockers
 from .curtains import find_curtains
+from .exposed import exposed_faces
 from .graph import CellGraph
 from .occludees import Occludees, find_occludees
 from .opaque import NO_PLANES, OpaquePlanes, opaque_planes
@@ -47,6 +48,12 @@ class PreparedModel:
     def closed(self) -> list[tuple[int, np.ndarray]]:
         """(object_id, triangles (m, 3, 3) int32) of each closed opaque element."""
         return closed_elements(self.scene)
+
+    @cached_property
+    def large_closed(self) -> list[np.ndarray]:
+        """Triangles of closed elements that are large enough to be cut at an angle."""
+        least = CURTAIN_M2 / self.scene.grid_m**2
+        return [t for _, t in self.closed if _flat_area(np.ptp(t, axis=(0, 1))[None])[0] >= least]
 
     def closed_of(self, role: Role) -> list[tuple[int, np.ndarray]]:
         """Those of one role."""
@@ -106,9 +113,7 @@ class PreparedModel:
     @cached_property
     def curtains(self) -> Blockers:
         """Upright rectangles at any angle, inside closed elements or on faces."""
-        solids, least = [triangles for _, triangles in self.closed], CURTAIN_M2 / self.scene.grid_m**2
-        large = [t for t in solids if _flat_area(np.ptp(t, axis=(0, 1))[None])[0] >= least]
-        return find_curtains(large, self.scene.triangles(*OPAQUE)[0], self.scene.grid_m)
+        return find_curtains(self.large_closed, self.scene.triangles(*OPAQUE)[0], self.scene.grid_m)
 
     @cached_property
     def walls(self) -> Blockers:
@@ -123,7 +128,7 @@ class PreparedModel:
     @cached_property
     def occludees(self) -> Occludees:
         """Objects and their pieces: what may be hidden."""
-        return find_occludees(self.scene)
+        return find_occludees(self.scene, exposed_faces(self.closed))
 
     def blockers(self, graph: CellGraph) -> Blockers:
         """What no sightline between live cells of a cell-and-portal graph of the model crosses."""

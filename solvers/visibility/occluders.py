@@ -15,6 +15,7 @@ import numpy as np
 
 from ...data.blockers import Blockers, join_blockers
 from ...data.occludees import Occludees
+from ...data.own_frames import find_own_frames
 from ...data.plans import NO_PLANS, Plans
 from ...data.prepared import no_patches, no_regions
 from ...data.ragged import places_of
@@ -27,6 +28,7 @@ from ...kernels.shields import Shields, device_shields
 from ...kernels.target import TargetAnswers, launch_target_search
 from .aim import AIM_ROUNDS, FIRST_TRIES, Sights, middles
 from .ledger import Ledger, apart, descend
+from .own_frames import FrameSearch
 from .search import segments
 
 # The root of the hierarchy is visible from everywhere: start where a level has some nodes.
@@ -51,6 +53,7 @@ class OccluderModel:
         shields: regions and patches.
         smallest: sides of view cells and of pieces that are not halved below this [grid steps].
         cap: halvings per piece.
+        frames: of view cells at an angle, which hide there first; not with certificates, which know one frame only.
     """
 
     sights: Sights
@@ -59,15 +62,19 @@ class OccluderModel:
     shields: Shields
     smallest: tuple[int, int]
     cap: int = SHAFT_CAP
+    frames: tuple[FrameSearch, ...] = ()
 
     @classmethod
-    def of(cls, sights: Sights, *, blockers: Blockers | None = None, shadows: bool = True) -> "OccluderModel":
+    def of(
+        cls, sights: Sights, *, blockers: Blockers | None = None, shadows: bool = True, frames: bool = True
+    ) -> "OccluderModel":
         """Copy a prepared model's occluders to the device.
 
         Args:
             sights: of the model.
             blockers: of its portal graph, if they are to hide too; they serve the search of lines only.
             shadows: whether regions and patches are to hide.
+            frames: whether view cells at an angle are searched in frames of their own too.
         """
         model, device = sights.model, sights.device
         regions, patches = (model.regions, model.patches) if shadows else (no_regions(), no_patches())
@@ -76,7 +83,9 @@ class OccluderModel:
             walls = join_blockers([blockers, walls])
         smallest = tuple(round(size / model.scene.grid_m) for size in SMALLEST_M)
         shields = device_shields(regions, patches, device)
-        return cls(sights, model.occludees, blocker_tree(walls, device), shields, smallest)
+        own = find_own_frames(model.scene, model.large_closed, sights.cells, sights.plans) if frames and shadows else []
+        searches = tuple(FrameSearch.of(frame, device) for frame in own)
+        return cls(sights, model.occludees, blocker_tree(walls, device), shields, smallest, frames=searches)
 
     @property
     def cells(self) -> np.ndarray:
@@ -85,7 +94,7 @@ class OccluderModel:
 
     def from_cells(self, cells: np.ndarray) -> "OccluderModel":
         """The same for other view cells."""
-        return replace(self, sights=self.sights.from_cells(cells))
+        return replace(self, sights=self.sights.from_cells(cells), frames=())
 
 
 def seen_objects(
@@ -105,10 +114,17 @@ def seen_objects(
     """
     occludees, hide = model.occludees, partial(_hide_nodes, model, ledger)
     clear = partial(_clear, model, NO_PLANS)
-    rows = descend(model.cells, block, occludees.levels, occludees.objects, FIRST_LEVEL, hide, clear)
-    rows = Rows.unseen(*rows)
+    own = [frame.places(block) >= 0 for frame in model.frames]
+    rest = block[~np.any([np.zeros(len(block), bool), *own], axis=0)]
+    found = [descend(model.cells, rest, occludees.levels, occludees.objects, FIRST_LEVEL, hide, clear)]
+    found += [
+        frame.left(block[mine], FIRST_LEVEL, NODE_CAP)
+        for frame, mine in zip(model.frames, own, strict=True)
+        if mine.any()
+    ]
+    rows = Rows.unseen(*(np.concatenate(column) for column in zip(*found, strict=True))).order()
     look_at_objects(model, rows, ())
-    return refine_objects(model, rows, aim_rounds, ledger)
+    return refine_objects(model, _hide_in_frames(model, rows), aim_rounds, ledger)
 
 
 def refine_objects(
@@ -159,6 +175,15 @@ def _clear(model: OccluderModel, plans: Plans, source: np.ndarray, boxes: np.nda
         everything = np.concatenate([cells, boxes])
         clear[rows] = both.part(len(everything), source[rows], len(cells) + rows, everything)
     return clear
+
+
+def _hide_in_frames(model: OccluderModel, rows: Rows) -> Rows:
+    """Rows without those that a frame of their view cell hides."""
+    kept = np.ones(len(rows), bool)
+    for frame in model.frames:
+        mine = np.flatnonzero(~rows.seen & (frame.places(rows.source) >= 0))
+        kept[mine] = ~frame.hides(rows.source[mine], rows.target[mine], PIECE_CAP)
+    return rows.take(kept)
 
 
 def _hide_nodes(model: OccluderModel, ledger: Ledger | None, source: np.ndarray, boxes: np.ndarray) -> np.ndarray:

@@ -70,7 +70,7 @@ class PortalEngine:
     @cached_property
     def occluders(self) -> OccluderModel:
         """Occluders of the model, made when they are first asked."""
-        return OccluderModel.of(self._sights)
+        return OccluderModel.of(self._sights, frames=not self._certify)
 
     def compile(self) -> None:
         """As of `Engine`."""

@@ -56,7 +56,8 @@ class ViewCellEngine:
         self._objects = len(model.scene.objects)
         blockers = None if portal_graph is None or certify else model.blockers(portal_graph)
         sights = Sights.of(model, cells, seed, device, plans)
-        self.model = OccluderModel.of(sights, blockers=blockers, shadows=method != "portals" or certify)
+        shadows = method != "portals" or certify
+        self.model = OccluderModel.of(sights, blockers=blockers, shadows=shadows, frames=not certify)
 
     @property
     def proof_occluders(self) -> tuple[Blockers, Regions, Patches]:

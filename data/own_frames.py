@@ -1,0 +1,218 @@
+"""Frames of their own for view cells at an angle: what hides around them along the axes of their own walls.
+
+From a room of a turned wing its walls are curtains, whose ways past are relaxed and many. In the frame of the wing they
+are axial rectangles, which the line search decides exactly and fast. A linear map of space takes lines to lines, so
+what no line reaches there is hidden here too, if boxes are rounded outwards on the grid of the frame, and every
+rectangle lies in a solid of the model as it is snapped: sections of closed elements are found in the frame, and kept
+where no triangle of their element comes near. Levels stay levels: slabs hide in the frame as they are.
+
+What is left is for the search in the model's own frame, where faces and joints are exact. Source of the idea, a frame
+for each part of a semi-axial model: Lei and Ouhyoung, "Carving", section 2.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .blockers import Blockers
+from .curtains import LEAST_M2, NEAR_DEG, THIN_M, UPRIGHT, cuts_inside, inside, largest_sections
+from .graph import OTHER_AXES
+from .hierarchy import build_hierarchy
+from .occludees import Occludees, turned_occludees
+from .plans import Plans, box_corners, plan_bounds, turned_plan
+from .scene import GRID_LIMIT, OPAQUE, Scene, turned
+from .solids import winding_numbers
+
+# The box around a cell's plan in its frame is wider than the plan by no more than this on every side [grid steps].
+FIT_STEPS = 3.0
+# Walls within so many steps of the direction of a plan, over its length, say what the direction is; walls within
+# TOGETHER_DEG of the most of them are averaged.
+ALIKE_STEPS, TOGETHER_DEG = 2.0, 0.02
+# Rounding in a turned frame moves a surface by less than one step; sections end so far inside their element, are cut so
+# far inside its faces, and no triangle of it comes so near [grid steps].
+ENDS, RECESS, CLEAR_STEPS = 1, 2, 0.25
+# What floating point may be off by [grid steps].
+DOUBT = 1e-3
+
+
+@dataclass(frozen=True)
+class OwnFrame:
+    """A frame that the model is turned back into, and what is needed to hide in it [grid steps].
+
+    Attributes:
+        yaw_deg: how the frame stands in the model's own, counter-clockwise about the origin.
+        cells: view cells that are searched in it, shape (n,), int64.
+        boxes: around them in the frame, shape (n, 2, 3), int32.
+        walls: axial rectangles of the frame inside closed elements.
+        occludees: all objects in boxes of the frame, rounded outwards.
+    """
+
+    yaw_deg: float
+    cells: np.ndarray
+    boxes: np.ndarray
+    walls: Blockers
+    occludees: Occludees
+
+
+def find_own_frames(scene: Scene, closed: list[np.ndarray], cells: np.ndarray, plans: Plans) -> list[OwnFrame]:
+    """Frames for view cells with a plan; cells whose plan is no rectangle get none.
+
+    Args:
+        scene: the model.
+        closed: triangles of closed opaque elements that may hide, (m, 3, 3) int32 of each.
+        cells: all view cells [grid steps], shape (m, 2, 3), int32.
+        plans: of some of them.
+    """
+    found = []
+    for yaw, rows, boxes in _groups(scene, plans):
+        boxes = np.concatenate([boxes, cells[plans.rows[rows]][:, :, 2:]], axis=2).astype(np.int32)
+        # Corners of the model may lie off the grid in the frame.
+        if np.abs(turned_plan(box_corners(scene.bounds()).astype(float), -yaw)).max() < GRID_LIMIT - 1:
+            walls = _walls(closed, yaw, scene.grid_m)
+            found.append(OwnFrame(yaw, plans.rows[rows], boxes, walls, turned_occludees(scene, yaw)))
+    return found
+
+
+def _groups(scene: Scene, plans: Plans) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    """Yaw of each frame [degrees], the plans that fit it, and the rectangles around them, shape (n, 2, 2), int64."""
+    corners = plans.corners.astype(float)
+    sides = np.roll(corners, -1, axis=1) - corners
+    length = np.hypot(sides[:, :, 0], sides[:, :, 1])
+    longest = sides[np.arange(len(sides)), length.argmax(axis=1)]
+    length = length.max(axis=1, initial=0.0)
+    yaw = np.degrees(np.arctan2(longest[:, 1], longest[:, 0])) % 90.0
+    walls = _wall_directions(scene)
+    left, groups = np.ones(len(corners), bool), []
+    while left.any():
+        # Rounding turns the longest plan the least.
+        pick = np.flatnonzero(left)[length[left].argmax()]
+        left[pick] = False
+        own = yaw[pick] + _mean_turn(*walls, yaw[pick], np.degrees(ALIKE_STEPS / length[pick]))
+        rows = np.append(pick, np.flatnonzero(left))
+        level = turned_plan(corners[rows].reshape(-1, 2), -own).reshape(-1, 4, 2)
+        around = plan_bounds(level)
+        # The area between a plan and the rectangle around it, over its outline.
+        wide = np.prod(around[:, 1] - around[:, 0], axis=1) - _area(level)
+        fits = wide <= FIT_STEPS * 2 * (around[:, 1] - around[:, 0]).sum(axis=1)
+        if fits[0]:
+            boxes = np.stack([np.floor(around[:, 0] - DOUBT), np.ceil(around[:, 1] + DOUBT)], axis=1)
+            groups.append((float(own), rows[fits], boxes[fits].astype(np.int64)))
+            left[rows[fits]] = False
+    return groups
+
+
+def _area(corners: np.ndarray) -> np.ndarray:
+    """Areas of plans, shape (n, 4, 2)."""
+    across, other = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    return np.abs(across[:, 0] * other[:, 1] - across[:, 1] * other[:, 0]) / 2
+
+
+def _wall_directions(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Direction of each upright opaque triangle, from 0 to 90 degrees, and its weight: long walls say it best."""
+    triangles, _ = scene.triangles(*OPAQUE)
+    edges = (triangles[:, 1:] - triangles[:, :1]).astype(float)
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    size = np.linalg.norm(normals, axis=1)
+    upright = np.abs(normals[:, 2]) <= UPRIGHT * size
+    extent = np.ptp(triangles[upright][:, :, :2], axis=1).astype(float)
+    yaw = np.degrees(np.arctan2(normals[upright, 1], normals[upright, 0])) % 90.0
+    return yaw, size[upright] * np.hypot(extent[:, 0], extent[:, 1])
+
+
+def _mean_turn(yaw: np.ndarray, weight: np.ndarray, near: float, within: float) -> float:
+    """How far from a direction most of the walls within some angle of it stand [degrees]."""
+    off = (yaw - near + 45.0) % 90.0 - 45.0
+    order = np.argsort(off)
+    order = order[np.abs(off[order]) <= within]
+    if not len(order):
+        return 0.0
+    off, weight = off[order], weight[order]
+    total = np.concatenate([[0.0], np.cumsum(weight)])
+    last = np.searchsorted(off, off + TOGETHER_DEG, side="right")
+    first = int((total[last] - total[:-1]).argmax())
+    return float(np.average(off[first : last[first]], weights=weight[first : last[first]]))
+
+
+def _walls(elements: list[np.ndarray], yaw: float, grid_m: float) -> Blockers:
+    """Axial rectangles of a turned frame inside closed elements whose faces stand along it."""
+    least, thin = LEAST_M2 / grid_m**2, THIN_M / grid_m
+    boxes, axes = [np.zeros((0, 2, 3), np.int64)], [np.zeros(0, np.int64)]
+    for triangles in elements:
+        flat = turned(triangles.astype(float), -yaw)
+        level = np.round(flat).astype(np.int64)
+        along = _faces_along(flat, least)
+        for axis in range(2) if any(len(faces) for faces in along) else ():
+            low, high = level[:, :, axis].min(axis=1), level[:, :, axis].max(axis=1)
+            depths = flat[along[axis]][:, :, axis].mean(axis=1)
+            for k in cuts_inside(depths, int(low.min()), int(high.max()), thin, RECESS) if len(depths) else ():
+                found = largest_sections(level[(low < k) & (high >= k)], axis, k, (ENDS, 0), least)
+                found = _flat_boxes(found, axis, k)
+                _enter(boxes, axes, axis, found[inside(turned(found.astype(float), yaw), triangles, CLEAR_STEPS)])
+        if any(len(faces) for faces in along):
+            for k, found in _levels(flat, level, least):
+                _enter(boxes, axes, 2, _flat_boxes(found, 2, k))
+    joined = np.concatenate(boxes).astype(np.int32)
+    return Blockers(joined, np.concatenate(axes).astype(np.int32), build_hierarchy(joined))
+
+
+def _enter(boxes: list[np.ndarray], axes: list[np.ndarray], axis: int, found: np.ndarray) -> None:
+    boxes.append(found)
+    axes.append(np.full(len(found), axis))
+
+
+def _flat_boxes(rectangles: np.ndarray, axis: int, k: int) -> np.ndarray:
+    """Rectangles (n, 2, 2) of a plane as flat boxes, shape (n, 2, 3), int64."""
+    boxes = np.full((len(rectangles), 2, 3), k, np.int64)
+    boxes[:, :, OTHER_AXES[axis]] = rectangles
+    return boxes
+
+
+def _faces_along(flat: np.ndarray, least: float) -> list[np.ndarray]:
+    """Triangles of an element that are upright faces across the x axis of a frame, and across y, if they are enough."""
+    edges = flat[:, 1:] - flat[:, :1]
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    size = np.linalg.norm(normals, axis=1)
+    upright = np.abs(normals[:, 2]) <= UPRIGHT * size
+    found = []
+    for axis in (0, 1):
+        off = np.abs(normals[:, 1 - axis]) <= np.sin(np.radians(NEAR_DEG)) * size
+        rows = np.flatnonzero(upright & off)
+        found.append(rows if size[rows].sum() / 2 >= least else rows[:0])
+    return found
+
+
+def _levels(flat: np.ndarray, level: np.ndarray, least: float) -> list[tuple[int, np.ndarray]]:
+    """Rectangles inside an element just below its tops and just above its bottoms, where its sides are upright.
+
+    Args:
+        flat: triangles of the closed element in the frame, unrounded but for their heights, shape (m, 3, 3), float64.
+        level: the same, rounded, int64.
+        least: smaller rectangles are left out [squared grid steps].
+
+    Returns:
+        Height, and rectangles (n, 2, 2), int64, of each.
+    """
+    low, high = level[:, :, 2].min(axis=1), level[:, :, 2].max(axis=1)
+    edges = flat[:, 1:] - flat[:, :1]
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    upright = np.abs(normals[:, 2]) <= UPRIGHT * np.linalg.norm(normals, axis=1)
+    found = []
+    for below, heights in ((True, high), (False, low)):
+        for k in np.unique(heights[low == high]).tolist():
+            cut = (low < k) & (high >= k) if below else (low <= k) & (high > k)
+            if not upright[cut].all():
+                continue
+            rectangles = largest_sections(level[cut], 2, k, (ENDS, ENDS), least, below=below)
+            # The sides stand over plan boxes; none comes near the inside of a rectangle.
+            sides = np.stack([flat[cut][:, :, :2].min(axis=1), flat[cut][:, :, :2].max(axis=1)], axis=1)
+            near = (sides[None, :, 0] < rectangles[:, None, 1] + CLEAR_STEPS) & (
+                sides[None, :, 1] > rectangles[:, None, 0] - CLEAR_STEPS
+            )
+            rectangles = rectangles[~near.all(axis=2).any(axis=1)]
+            middles = np.column_stack(
+                [rectangles.mean(axis=1), np.full(len(rectangles), k - 0.5 if below else k + 0.5)]
+            )
+            rectangles = rectangles[np.abs(winding_numbers(middles, flat)) > 0.5]
+            if len(rectangles):
+                found.append((k, rectangles))
+    return found
