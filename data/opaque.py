@@ -232,11 +232,13 @@ def _mark_near(a: np.ndarray, b: np.ndarray, us: np.ndarray, vs: np.ndarray, cro
     low, high = (a, b) if a[1] <= b[1] else (b, a)
     slope = (high[0] - low[0]) / max(high[1] - low[1], 1)
     first = max(int(np.searchsorted(vs, low[1] - ROUNDED_REACH, side="right")) - 1, 0)
-    for row in range(first, min(int(np.searchsorted(vs, high[1] + ROUNDED_REACH)), len(vs) - 1)):
-        # The slope is at most 1: reaching further along v moves the edge no further along u.
-        ends = [low[0] + (np.clip(v, low[1], high[1]) - low[1]) * slope for v in (vs[row], vs[row + 1])]
-        start = max(int(np.searchsorted(us, min(ends) - 2 * ROUNDED_REACH, side="right")) - 1, 0)
-        crossed[start : int(np.searchsorted(us, max(ends) + 2 * ROUNDED_REACH)), row] = True
+    last = min(int(np.searchsorted(vs, high[1] + ROUNDED_REACH)), len(vs) - 1)
+    # The slope is at most 1: reaching further along v moves the edge no further along u.
+    at = low[0] + (np.clip(vs[first : last + 1], low[1], high[1]) - low[1]) * slope
+    starts = np.searchsorted(us, np.minimum(at[:-1], at[1:]) - 2 * ROUNDED_REACH, side="right") - 1
+    stops = np.searchsorted(us, np.maximum(at[:-1], at[1:]) + 2 * ROUNDED_REACH)
+    for row, start, stop in zip(range(first, last), np.maximum(starts, 0).tolist(), stops.tolist(), strict=True):
+        crossed[start:stop, row] = True
 
 
 def _add_oblique(
