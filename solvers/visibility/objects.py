@@ -5,6 +5,8 @@ the object's triangles, a sightline can reach. Source: Funkhouser et al. 1996, s
 sharper.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...data.incidence import Incidence
@@ -17,7 +19,11 @@ from .search import search_rounds, segments
 
 
 def object_rows(
-    model: CellModel, incidence: Incidence, reached: Rows, aim_rounds: tuple[int, ...] = AIM_ROUNDS
+    model: CellModel,
+    incidence: Incidence,
+    reached: Rows,
+    aim_rounds: tuple[int, ...] = AIM_ROUNDS,
+    handed_on: Callable[[Rows], np.ndarray] | None = None,
 ) -> Rows:
     """Every object that is not proved hidden from the sources of `reached`, ordered.
 
@@ -26,6 +32,8 @@ def object_rows(
         incidence: of the objects with its cells.
         reached: cells that are not proved hidden.
         aim_rounds: sightlines shot at each part that could not be hidden, round by round.
+        handed_on: which cells, of all, are searched again anyhow, as far as the rows tell; shape (cells,), bool. The
+            last and longest round is left to that search, which hides first and shoots at fewer parts.
 
     Returns:
         Reached pairs. A pair that is left out is hidden, exactly.
@@ -41,6 +49,8 @@ def object_rows(
     potential, hints, kept_parts, hint_pair = _prove(model, incidence, rows, parts, part_source, pair_of)
     for number, tries in enumerate(aim_rounds):
         todo = np.flatnonzero(~rows.seen[hint_pair])
+        if handed_on is not None and number == len(aim_rounds) - 1:
+            todo = todo[~handed_on(rows.take(potential | rows.seen))[rows.source[hint_pair[todo]]]]
         at = kept_parts[todo]
         sights.aim(rows, hint_pair[todo], incidence.boxes[at], hints[todo], at, tries, number + 1)
     return rows.take(potential | rows.seen)

@@ -103,7 +103,7 @@ class PortalEngine:
             cells = self._hide_cells(cells, ledger)
         if ledger is not None:
             return Part(cells, *seen_objects(self.occluders, block, for_objects, ledger))
-        objects = object_rows(self.model, self._incidence, cells, for_objects)
+        objects = object_rows(self.model, self._incidence, cells, for_objects, self._unknown_sources)
         doubtful = ~objects.seen & self._unknown_sources(objects)[objects.source]
         if doubtful.any():
             better, _ = refine_objects(self.occluders, objects.take(doubtful), for_objects)

@@ -89,3 +89,22 @@ def test_sources_do_not_depend_on_their_company(house, reached):
         mine = together.take(together.source == source)
         for name in ("source", "target", "verdict", "origin", "end"):
             np.testing.assert_array_equal(getattr(alone, name), getattr(mine, name), err_msg=name)
+
+
+def test_the_longest_round_is_left_to_who_goes_on(house, reached):
+    """With all cells handed on it is not shot, with none it is; the rows say what was seen till then."""
+    model, _, incidence = house
+    rounds, told = (2, 0, 900), []
+
+    def handed_on(rows, answer):
+        told.append(rows)
+        return np.full(model.graph.cell_count, answer)
+
+    left, kept = (
+        object_rows(model, incidence, reached, rounds, lambda rows, answer=answer: handed_on(rows, answer))
+        for answer in (True, False)
+    )
+    short, full = object_rows(model, incidence, reached, rounds[:2]), object_rows(model, incidence, reached, rounds)
+    assert np.array_equal(left.seen, short.seen) and np.array_equal(kept.seen, full.seen)
+    assert pairs_of(left) == pairs_of(full) and full.seen.sum() > short.seen.sum()
+    assert len(told) == 2 and all(np.array_equal(rows.seen, short.seen) for rows in told)
