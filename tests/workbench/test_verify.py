@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from builders import corridors, small_house, turned_house
+from builders.room_sets import assert_room_sets
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.graph import OTHER_AXES, CellGraph
@@ -471,6 +472,12 @@ def test_undecided_pairs_are_counted_among_the_unknown(tmp_path, monkeypatch):
 @pytest.fixture(scope="module")
 def turned(tmp_path_factory):
     return turned_house.turned_bake(tmp_path_factory.mktemp("turned") / "turned.bake", certify=True)
+
+
+def test_rooms_with_view_cells_at_an_angle_claim_nothing_of_each_other(turned):
+    assert_room_sets(turned)
+    assert turned.rooms["claims_rooms"].to_pylist() == [False, False]
+    assert turned.room_to_room["verdict"].to_pylist() == ["visible", "unknown", "unknown", "visible"]
 
 
 def test_a_bake_with_prisms_stands(turned):

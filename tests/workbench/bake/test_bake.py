@@ -12,6 +12,7 @@ from builders import corridors, random_buildings
 from builders.places import SHARED
 from builders.random_buildings import box_triangles as box
 from builders.random_buildings import scene_of, tetrahedron
+from builders.room_sets import assert_room_sets
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.scene import Role
@@ -24,6 +25,7 @@ from viewcell.workbench.baked import load
 
 METRE = 1024
 TABLES = ("cell_to_cell", "cell_to_object")
+ROOM_TABLES = ("rooms", "room_to_object", "room_to_room")
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +39,7 @@ def office_bake(office, tmp_path_factory):
 
 
 def same_tables(one, other):
-    return all(getattr(one, name).equals(getattr(other, name)) for name in (*TABLES,)) and all(
+    return all(getattr(one, name).equals(getattr(other, name)) for name in (*TABLES, *ROOM_TABLES)) and all(
         (one.folder / f"{name}.parquet").read_bytes() == (other.folder / f"{name}.parquet").read_bytes()
         for name in ("cells", "portals")
     )
@@ -72,6 +74,27 @@ def test_office_is_two_sided(office_bake):
     cell = int(np.flatnonzero(office_bake.graph.inhabitable)[0])
     assert set(office_bake.seen(cell)) <= set(office_bake.potential(cell))
     assert 0 < len(office_bake.potential(cell)) < counts["objects"]
+
+
+def test_rooms_see_what_their_cells_see(office, office_bake):
+    assert_room_sets(office_bake)
+    rooms = office_bake.rooms
+    assert rooms["name"].to_pylist() == [space.name for space in office.spaces] and rooms["claims_rooms"].to_pylist()
+    # Every inhabitable cell belongs to the room that it is called after, and rooms do not see all of each other.
+    names = office_bake.graph.cell_names
+    assert {cell for own in rooms["cells"].to_pylist() for cell in own} == set(np.flatnonzero(names != "").tolist())
+    for row in rooms.to_pylist():
+        assert row["covered"] > 0.95 and {names[cell] for cell in row["cells"]} == {row["name"]}
+    assert office_bake.room_to_room.num_rows < rooms.num_rows**2
+
+
+def test_rooms_of_a_bake_of_view_cells_claim_nothing_of_each_other(office, tmp_path):
+    options = {"cells": "octree", "cell_size_m": 6.0, "depth": 0, "method": "occluders"}
+    made = viewcell.bake(office, tmp_path / "views", settings=Settings(**options))
+    assert_room_sets(made)
+    assert not any(made.rooms["claims_rooms"].to_pylist()) and made.room_to_room.num_rows == made.rooms.num_rows**2
+    # Cells reach over walls, so a room has more of them than it fills; all of it lies in some.
+    assert min(made.rooms["covered"].to_pylist()) > 0.95
 
 
 @pytest.mark.parametrize(("name", "rows"), [("office", None), ("w48", round(38.42857 * 182))])
