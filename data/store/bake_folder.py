@@ -153,12 +153,12 @@ class BakeFolder:
     @cached_property
     def rooms_of_cells(self) -> list[str]:
         """Rooms of each cell in words, such as "A101 Foyer, Level 1"; the cell's own name where it has no room."""
-        words = [str(name) for name in self.graph.cell_names]
-        found: dict[int, list[str]] = {}
-        for room in self.rooms.to_pylist():
-            for cell in room["cells"]:
-                found.setdefault(cell, []).append(room_tables.room_words(room))
-        return ["; ".join(found.get(cell, [name])) for cell, name in enumerate(words)]
+        return room_tables.words_of_cells(self.rooms, self.graph.cell_names)
+
+    def cell_text(self, cell: int) -> str:
+        """A cell's number and rooms, for messages: "12 (A101 Foyer, Level 1)"; the number alone where it has none."""
+        words = self.rooms_of_cells[cell]
+        return f"{cell} ({words})" if words else f"{cell}"
 
     @cached_property
     def cracks(self) -> np.ndarray:

@@ -46,10 +46,24 @@ def room_tables(spaces: list[Space], rooms: RoomCells, rows: tuple[Rows | None, 
     }
 
 
-def room_words(room: dict) -> str:
-    """A row of rooms.parquet in words: its names, each once, and its storey."""
-    names = " ".join(dict.fromkeys(filter(None, (room["name"], room["long_name"]))))
-    return f"{names}, {room['storey']}" if room["storey"] else names
+def words_of_cells(rooms: pa.Table | None, names: np.ndarray) -> list[str]:
+    """Rooms of each cell in a line, such as "A101 Foyer, Level 1"; the cell's own name where it has no room.
+
+    Args:
+        rooms: with the columns of rooms.parquet; None where there are none.
+        names: of all cells, shape (cells,), str.
+    """
+    found: dict[int, list[str]] = {}
+    for room in [] if rooms is None else rooms.to_pylist():
+        for cell in room["cells"]:
+            found.setdefault(cell, []).append(_room_words(room))
+    return [" ".join("; ".join(found.get(cell, [str(name)])).split()) for cell, name in enumerate(names)]
+
+
+def _room_words(room: dict) -> str:
+    """A room's names, each once, and its storey."""
+    called = " ".join(dict.fromkeys(filter(None, (room["name"], room["long_name"]))))
+    return f"{called}, {room['storey']}" if room["storey"] else called
 
 
 def _pairs(columns: tuple[str, ...], room: np.ndarray, target: np.ndarray, verdict: np.ndarray) -> pa.Table:

@@ -40,6 +40,7 @@ class StandIn:
     yaw_deg: float = 0.0
     rooms: pa.Table = field(default_factory=lambda: read_room_table(Path("none"), "rooms"))
     rooms_of_cells = property(BakeFolder.rooms_of_cells.func)
+    cell_text = BakeFolder.cell_text
 
 
 def small_graph() -> CellGraph:
