@@ -126,13 +126,13 @@ def _read(path: Path, content: bytes, model: Model, roles: RoleRules) -> _Buildi
         if event == "start":
             continue
         name = element.tag.removeprefix(namespace)
-        building.words.gather(name, Node(element, namespace))
+        building.words.gather(name, Node(element))
         if name == "Surface":
             surfaces += 1
-            _add_surface(Node(element, namespace), building)
+            _add_surface(Node(element), building)
             element.clear()
         elif name == "Space":
-            _gather_space(Node(element, namespace), building)
+            _gather_space(Node(element), building)
             element.clear()
     if not surfaces:
         raise InputError(f"{path}: expected surfaces, found none")

@@ -10,19 +10,17 @@ from .assemble import Part
 
 @dataclass(frozen=True)
 class Node:
-    """An element whose children are asked for by name, in the file's namespace."""
+    """An element whose children are asked for by name, in any namespace: tools that mend files add some without one."""
 
     element: ElementTree.Element
-    namespace: str
 
     def all(self, *way: str) -> list["Node"]:
         """Elements at the end of a way of names."""
-        found = self.element.findall("/".join(self.namespace + name for name in way))
-        return [Node(one, self.namespace) for one in found]
+        return [Node(one) for one in self.element.findall("/".join("{*}" + name for name in way))]
 
     def text(self, name: str) -> str:
         """Text of the child of a name; empty if there is none."""
-        return (self.element.findtext(self.namespace + name) or "").strip()
+        return (self.element.findtext("{*}" + name) or "").strip()
 
     def get(self, name: str) -> str:
         """An attribute; empty if there is none."""
