@@ -526,5 +526,8 @@ def test_shared_duplex(tmp_path):
     print(f"overestimate: cells {inhabitable.overestimate:.3f}, objects {objects.overestimate:.3f}")
     # Two stairwells and the roof are view cells too: of their pairs more are open than elsewhere.
     assert inhabitable.overestimate < 1.2 and objects.overestimate < 1.15
+    assert_room_sets(bake)
+    foyer = bake.rooms.to_pylist()[bake.rooms["name"].to_pylist().index("A101")]
+    assert (foyer["long_name"], foyer["guid"], foyer["storey"]) == ("Foyer", "0BTBFw6f90Nfh9rP1dlXrr", "Level 1")
     again = viewcell.bake(model, tmp_path / "again", threads=1)
     assert same_tables(again, bake)
