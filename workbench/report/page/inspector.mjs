@@ -12,6 +12,9 @@ const REASON = [
 ];
 const ELSEWHERE = "Its sightline is in the bake's folder; this page holds those to the largest targets only.";
 
+// View cells of a room that are named.
+const NUMBERED = 16;
+
 /** Classes of targets that are counted apart: name, kind, which of the kind, and how many there are. */
 export function classesOf({ cells, facts, sources, cellCount, objectCount }) {
   const ofCells = [
@@ -40,9 +43,10 @@ function cellFacts(bake, cell) {
 export function roomFacts(bake, room) {
   const { covered, elevation, guid } = bake.rooms.words[room],
     cells = bake.cellsOf(room),
-    one = cells.length === 1;
+    one = cells.length === 1,
+    numbers = [...cells.slice(0, NUMBERED), ...(cells.length > NUMBERED ? ["..."] : [])].join(", ");
   const words = [
-    `${count(cells.length)} view cell${one ? "" : "s"} (${cells.join(", ")}) together`,
+    `${count(cells.length)} view cell${one ? "" : "s"} (${numbers}) together`,
     covered === null ? "" : `${one ? "it holds" : "they hold"} ${(100 * covered).toFixed(0)} % of where eyes may be in it`,
     elevation === null ? "" : `storey at ${elevation.toFixed(2)} m by the file`,
     guid,

@@ -70,6 +70,11 @@ test("a room in words and numbers: of all its view cells together", () => {
     [0, 0, 2],
     [0, 0, 1],
   ]);
+  const many = chosen((data) => {
+    data.rooms.starts.set([0, 1, 18, 18]);
+    data.rooms.cells = new Uint8Array(18).fill(2);
+  });
+  assert.match(roomFacts(many.bake, 1), /^17 view cells \((2, ){16}\.\.\.\) together/);
   const beside = chosen((data) => {
     data.cells.firstPlan = 3;
   });
