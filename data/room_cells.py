@@ -82,7 +82,7 @@ def add_room_cells(
         solids: closed elements, in which nobody stands.
     """
     covers, prisms, names = [], [], []
-    for space, points in zip(scene.spaces, _all_points(scene, solids), strict=True):
+    for space, points in zip(scene.spaces, room_points(scene, solids), strict=True):
         share = _covered_share(space, points, graph)
         made: list[tuple[np.ndarray, np.ndarray]] = []
         if share < COVERED_SHARE and len(points):
@@ -97,7 +97,7 @@ def add_room_cells(
 
 def room_covers(scene: Scene, graph: CellGraph, solids: list[tuple[int, np.ndarray]]) -> list[RoomCover]:
     """How the rooms of a model are covered by the inhabitable cells of a graph that are named after them."""
-    points = zip(scene.spaces, _all_points(scene, solids), strict=True)
+    points = zip(scene.spaces, room_points(scene, solids), strict=True)
     return [_cover(space, own, _covered_share(space, own, graph)) for space, own in points]
 
 
@@ -114,8 +114,8 @@ def _cover(space: Space, points: np.ndarray, share: float) -> RoomCover:
     return RoomCover(room_name(space), share, why)
 
 
-def _all_points(scene: Scene, solids: list[tuple[int, np.ndarray]]) -> list[np.ndarray]:
-    """`eye_points` of each room outside all solids [grid steps]."""
+def room_points(scene: Scene, solids: list[tuple[int, np.ndarray]]) -> list[np.ndarray]:
+    """`eye_points` of each room outside all solids [grid steps], each of shape (n, 3), float64."""
     points = [eye_points(space) / scene.grid_m for space in scene.spaces]
     around = [np.array([own.min(axis=0), own.max(axis=0)]) if len(own) else np.zeros((2, 3)) for own in points]
     index = SolidIndex(np.array(around).reshape(-1, 2, 3), solids)
@@ -145,20 +145,26 @@ def _covered_share(space: Space, points: np.ndarray, graph: CellGraph) -> float:
     """Share of points of a room [grid steps] that lie in inhabitable cells named after it."""
     if not len(points):
         return 0.0
-    name = room_name(space)
     low, high = points.min(axis=0), points.max(axis=0)
     near = graph.inhabitable & (graph.cells[:, 0] <= high).all(axis=1) & (graph.cells[:, 1] >= low).all(axis=1)
     held = np.zeros(len(points), bool)
     for cell in np.flatnonzero(near):
-        # Names of rooms may hold commas themselves.
-        if f", {name}, " not in f", {graph.cell_names[cell]}, ":
-            continue
-        inside = np.flatnonzero(
-            ((points >= graph.cells[cell, 0]) & (points <= graph.cells[cell, 1])).all(axis=1) & ~held
-        )
-        own = graph.plans.hold(np.full(len(inside), cell), points[inside], graph.cell_count)
-        held[inside[own]] = True
+        if called_after(graph.cell_names[cell], space):
+            held |= points_in_cell(graph, cell, points)
     return float(held.mean())
+
+
+def called_after(cell_name: str, space: Space) -> bool:
+    """Whether a cell's name has the room's in it; names of rooms may hold commas themselves."""
+    return f", {room_name(space)}, " in f", {cell_name}, "
+
+
+def points_in_cell(graph: CellGraph, cell: int, points: np.ndarray) -> np.ndarray:
+    """Points [grid steps], shape (n, 3), in a closed cell, or in its box and strictly in its plan, shape (n,), bool."""
+    held = ((points >= graph.cells[cell, 0]) & (points <= graph.cells[cell, 1])).all(axis=1)
+    inside = np.flatnonzero(held)
+    held[inside] = graph.plans.hold(np.full(len(inside), cell), points[inside], graph.cell_count)
+    return held
 
 
 def eye_points(space: Space) -> np.ndarray:

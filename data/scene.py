@@ -64,6 +64,19 @@ class Definition:
 
 
 @dataclass(frozen=True)
+class NamedStorey:
+    """A storey as the model's file tells it, which what is found in the cells' heights may differ from.
+
+    Attributes:
+        name: the file's own; several storeys may share one.
+        elevation_m: as the file states it [m], from a zero that the file chooses; None where it states none.
+    """
+
+    name: str
+    elevation_m: float | None = None
+
+
+@dataclass(frozen=True)
 class Instance:
     """A placed definition, called an *object* in the tables; its object_id is its place in `Scene.objects`.
 
@@ -71,6 +84,8 @@ class Instance:
         transform: definition frame to scene frame (metres from `Scene.origin`, Z up), shape (4, 4), float64.
         guid: the file's own lasting name, such as an IFC GlobalId; empty where the format has none.
         why: what it was taken for glass or a door by, in words; empty for the rest, and not kept in folders.
+        storey: that the file puts it on; None where it says none.
+        materials: names of what the file says it is made of, each once, in the file's order.
     """
 
     name: str
@@ -80,6 +95,8 @@ class Instance:
     role: Role
     guid: str = ""
     why: str = ""
+    storey: NamedStorey | None = None
+    materials: tuple[str, ...] = ()
 
     @property
     def opaque(self) -> bool:
@@ -94,11 +111,16 @@ class Space:
     Attributes:
         vertices: [m], scene frame, shape (n, 3), float64.
         faces: shape (m, 3), int32; a closed surface.
+        long_name: the file's longer name, such as "Foyer" for the room "A101"; empty where it has none.
+        guid, storey: as in `Instance`.
     """
 
     name: str
     vertices: np.ndarray
     faces: np.ndarray
+    long_name: str = ""
+    guid: str = ""
+    storey: NamedStorey | None = None
 
 
 @dataclass
@@ -108,7 +130,7 @@ class Scene:
     Attributes:
         definitions: shapes.
         objects: placed shapes; the index is the object_id.
-        spaces: room volumes, possibly none.
+        spaces: room volumes, possibly none; the index is the room_id.
         openings: boxes of doors, windows and voids [m], shape (n, 2, 3), float64: shut to find rooms by flooding.
         origin: whole metres subtracted from the model's coordinates, float64 x 3.
         yaw_deg: the model is then turned back by this about the vertical [degrees, counter-clockwise]; see `in_model`.

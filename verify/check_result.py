@@ -43,6 +43,7 @@ class CheckResult:
     Attributes:
         cell_ids: of the view cells, as their table calls them, shape (cells,).
         sources: view cells that were checked, shape (sources,), int.
+        cell_rooms: rooms, or names, of the view cells in words, empty where they have none; None if none has any.
         object_names: names of the model's objects.
         claimed: by kind of target, shape (cells, targets), bool.
         seen: the same of pairs that some sightline of this check joined.
@@ -70,6 +71,7 @@ class CheckResult:
     object_names: list[str]
     claimed: dict[str, np.ndarray]
     seen: dict[str, np.ndarray]
+    cell_rooms: list[str] | None = None
     silent: np.ndarray | None = None
     wrong: list[WrongPair] = field(default_factory=list)
     exact: bool = False
@@ -160,10 +162,10 @@ class CheckResult:
         target = (
             f"object {pair.target} {self.object_names[pair.target]!r}"
             if pair.kind == "object"
-            else f"cell {self.cell_ids[pair.target]}"
+            else f"cell {self.cell_text(pair.target)}"
         )
         line = (
-            f"cell {self.cell_ids[pair.cell]} sees {target}: from ({', '.join(f'{c:.4f}' for c in start)}) "
+            f"cell {self.cell_text(pair.cell)} sees {target}: from ({', '.join(f'{c:.4f}' for c in start)}) "
             f"along ({', '.join(f'{c:.6f}' for c in way / length)}) for {length:.3f} {self.unit}"
         )
         if pair.portals:
@@ -173,6 +175,11 @@ class CheckResult:
             near = [f"{self.object_names[k]!r} {self._length(distance)}" for k, distance in pair.nearest]
             line += f" (nearest: {', '.join(near)})" if near else ""
         return line
+
+    def cell_text(self, cell: int) -> str:
+        """A view cell by its id and, in brackets, its rooms."""
+        words = "" if self.cell_rooms is None else self.cell_rooms[cell]
+        return f"{self.cell_ids[cell]} ({words})" if words else f"{self.cell_ids[cell]}"
 
     def _length(self, steps: float) -> str:
         """A length as it is printed, small ones in thousandths."""
@@ -189,7 +196,7 @@ class CheckResult:
             lines += ["|---|---|---|---|---|"]
             for row in order:
                 numbers = f"{claimed[row]:,} | {seen[row]:,} | {_ratio(claimed[row], seen[row])} | {wrong[row]:,}"
-                lines.append(f"| {self.cell_ids[self.sources[row]]} | {numbers} |")
+                lines.append(f"| {self.cell_text(self.sources[row])} | {numbers} |")
         return lines
 
 

@@ -62,6 +62,7 @@ class VerifyResult:
         random_rays: of the guided ones that are independent and random, for each inhabitable cell with a free point.
         wrong_hidden: hidden pairs that an exactly adjudicated sightline shows; the run stops at the first.
         case: the case file written for it.
+        pair: that pair in words; empty if there is none.
         grazes: candidate rays that only touch an edge, a vertex or a boundary.
         leaks: candidate rays through gaps narrower than the bake's seal.
         blocked: candidate rays that the exact test stops: Embree had missed a triangle.
@@ -81,6 +82,7 @@ class VerifyResult:
     random_rays: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     wrong_hidden: int = 0
     case: Path | None = None
+    pair: str = ""
     grazes: int = 0
     leaks: int = 0
     blocked: int = 0
@@ -116,7 +118,7 @@ class VerifyResult:
         ]
         confident = self.guided_rays and not self.wrong_hidden
         rows = [
-            ("wrong-hidden", f"{self.wrong_hidden}" + (f" (case file {self.case})" if self.case else "")),
+            ("wrong-hidden", f"{self.wrong_hidden}" + (f" (case file {self.case}): {self.pair}" if self.case else "")),
             ("rays, for objects / for cells", f"{self.rays:,} / {self.cell_rays:,}"),
             *([("guided rays", f"{self.guided_rays:,}")] if self.guided_rays else []),
             ("rays per second", f"{self.rays_per_second:,.0f}{ratio}"),

@@ -86,11 +86,13 @@ class Replayed:
         case: as read.
         hidden: the bake still hides the pair.
         judgement: what the exact test says of the sightline now.
+        pair: the cell and what it sees, in words.
     """
 
     case: WrongHidden
     hidden: bool
     judgement: Judgement
+    pair: str
 
     @property
     def ok(self) -> bool:
@@ -100,9 +102,8 @@ class Replayed:
     def line(self) -> str:
         """The outcome in one line."""
         verdict = "hidden" if self.hidden else "potential"
-        pair = f"cell {self.case.cell}, {self.case.kind} {self.case.target}"
         state = "fixed" if self.ok else "wrong-hidden"
-        return f"{state}: {pair}: bake says {verdict}, the sightline is {self.judgement.name.lower()}"
+        return f"{state}: {self.pair}: bake says {verdict}, the sightline is {self.judgement.name.lower()}"
 
 
 def replay(path: str | Path, bake: "BakeFolder | None" = None) -> Replayed:
@@ -125,7 +126,13 @@ def replay(path: str | Path, bake: "BakeFolder | None" = None) -> Replayed:
         raise InputError(f"{path}: expected ids below {table.shape}, found cell {case.cell}, target {case.target}")
     origin, direction = np.array(case.origin), np.array(case.direction)
     judgement = make_judge(bake).judge(case.kind, case.cell, case.target, origin, origin + direction)
-    return Replayed(case, not table[case.cell, case.target], judgement)
+    pair = _pair_text(bake, case.cell, case.kind, case.target)
+    return Replayed(case, not table[case.cell, case.target], judgement, pair)
+
+
+def _pair_text(bake: "BakeFolder", cell: int, kind: str, target: int) -> str:
+    """A pair in words, with the rooms of cells."""
+    return f"cell {bake.cell_text(cell)}, {kind} {bake.cell_text(target) if kind == 'cell' else target}"
 
 
 def make_judge(bake: "BakeFolder") -> Judge:
@@ -289,7 +296,7 @@ def _judge_batch(
             line = bake.in_model(np.stack([origin, end]) * bake.grid_m)
             ends = tuple(tuple(point) for point in line.tolist())
             case = WrongHidden(str(Path(bake.folder).resolve()), model, cell, kind, target, *vectors, ends)
-            result.case = write_case(case)
+            result.case, result.pair = write_case(case), _pair_text(bake, cell, kind, target)
             return True
     return False
 
@@ -307,4 +314,4 @@ def _confirm_all(bake: "BakeFolder", judge: Judge, progress: bool, result: Verif
                 reasons = confirm_cells(part, bake.graph, judge.lines)
             else:
                 reasons = confirm_objects(part, bake.graph, judge.lines, judge.glass)
-            outcome.add(kind, part.cells, part.targets, reasons)
+            outcome.add(kind, part.cells, part.targets, reasons, bake.cell_text)

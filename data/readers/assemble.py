@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..frame import turn_note, wall_yaw
-from ..scene import GRID_LIMIT, Definition, Instance, Mesh, Role, Scene, Space, degenerate, snap, turned
+from ..scene import GRID_LIMIT, Definition, Instance, Mesh, NamedStorey, Role, Scene, Space, degenerate, snap, turned
 
 MAX_COORDINATE_M = 1.0e9
 # Strays are at most this share of the parts, and further off than this, and than so many times the others reach.
@@ -27,7 +27,7 @@ class Part:
         vertices: [m], in the shape's own frame, shape (n, 3), float64.
         faces: shape (m, 3), int.
         transform: shape's frame to the model's, metres, Z up, shape (4, 4), float64.
-        guid, why: as in `Instance`.
+        guid, why, storey, materials: as in `Instance`.
         colours: as in `Mesh`.
     """
 
@@ -41,6 +41,8 @@ class Part:
     guid: str = ""
     why: str = ""
     colours: np.ndarray | None = None
+    storey: NamedStorey | None = None
+    materials: tuple[str, ...] = ()
 
     def placed(self) -> np.ndarray:
         """Vertices in the model's frame [m]."""
@@ -100,7 +102,7 @@ def assemble(model: Model) -> Scene:
     return Scene(
         definitions=definitions,
         objects=objects,
-        spaces=[Space(space.name, space.vertices - origin, space.faces) for space in spaces],
+        spaces=[replace(space, vertices=space.vertices - origin) for space in spaces],
         openings=np.array(boxes).reshape(-1, 2, 3),
         origin=origin,
         yaw_deg=yaw_deg,
@@ -216,7 +218,8 @@ def _share(parts: list[Part], origin: np.ndarray, model: Model) -> tuple[list[De
             definition_id, centre = known[part.shape]
             to_scene = part.transform.copy()
             to_scene[:3, 3] += part.transform[:3, :3] @ centre - origin
-        objects.append(Instance(part.name, part.kind, definition_id, to_scene, part.role, part.guid, part.why))
+        words = part.guid, part.why, part.storey, part.materials
+        objects.append(Instance(part.name, part.kind, definition_id, to_scene, part.role, *words))
     if dropped:
         model.skip(f"{dropped} triangles", "no area on the grid")
     return definitions, objects

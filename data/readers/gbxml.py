@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..scene import LOST_ROOM, Role, Scene, Space
 from .archive import only_file
 from .assemble import Model, Part, assemble
+from .gbxml_words import Node, Words
 from .rings import newell, ring_triangles
 from .roles import RoleRules, Taken
 from .units import METRES, metres_per_unit
@@ -45,6 +46,8 @@ class _Building:
         shells: triangles of each space by its own geometry, (vertices, faces), or None.
         sides: surfaces around each space: polygon and whether it is seen from behind.
         faults: how often each fault was found, and where first.
+        words: what the file says of storeys and materials.
+        beside: of each part the spaces that it bounds, and its construction.
     """
 
     metres: float
@@ -55,6 +58,11 @@ class _Building:
     shells: dict[str, list[np.ndarray]] = field(default_factory=dict)
     sides: dict[str, list[np.ndarray]] = field(default_factory=dict)
     faults: dict[str, list[str]] = field(default_factory=dict)
+    words: Words = field(init=False)
+    beside: list[tuple[tuple[str, ...], str]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.words = Words(self.metres)
 
     def fault(self, what: str, where: str) -> None:
         """Gather a fault, to be noted once for all places where it is."""
@@ -75,6 +83,8 @@ def read_gbxml(path: Path, model: Model, roles: RoleRules) -> Scene:
     content = only_file(path, (".xml", ".gbxml")) if zipfile.is_zipfile(path) else _bytes(path)
     _check_xml(path, content)
     building = _read(path, content, model, roles)
+    told = zip(model.parts, building.beside, strict=True)
+    model.parts = [building.words.told(part, *beside) for part, beside in told]
     _add_spaces(building)
     for what, places in building.faults.items():
         more = f" and {len(places) - 1} more" if len(places) > 1 else ""
@@ -116,12 +126,13 @@ def _read(path: Path, content: bytes, model: Model, roles: RoleRules) -> _Buildi
         if event == "start":
             continue
         name = element.tag.removeprefix(namespace)
+        building.words.gather(name, Node(element))
         if name == "Surface":
             surfaces += 1
-            _add_surface(_Node(element, namespace), building)
+            _add_surface(Node(element), building)
             element.clear()
         elif name == "Space":
-            _gather_space(_Node(element, namespace), building)
+            _gather_space(Node(element), building)
             element.clear()
     if not surfaces:
         raise InputError(f"{path}: expected surfaces, found none")
@@ -155,25 +166,7 @@ def _unit(path: Path, unit: str | None, model: Model) -> tuple[float, str]:
     return metres, name
 
 
-@dataclass(frozen=True)
-class _Node:
-    """An element whose children are asked for by name, in the file's namespace."""
-
-    element: ElementTree.Element
-    namespace: str
-
-    def all(self, *way: str) -> list["_Node"]:
-        found = self.element.findall("/".join(self.namespace + name for name in way))
-        return [_Node(one, self.namespace) for one in found]
-
-    def text(self, name: str) -> str:
-        return (self.element.findtext(self.namespace + name) or "").strip()
-
-    def get(self, name: str) -> str:
-        return self.element.get(name, "")
-
-
-def _ring(loop: _Node, metres: float) -> np.ndarray:
+def _ring(loop: Node, metres: float) -> np.ndarray:
     """Corners of a polygon [m], shape (n, 3), each once.
 
     Raises:
@@ -188,7 +181,7 @@ def _ring(loop: _Node, metres: float) -> np.ndarray:
     return ring[(ring != np.roll(ring, 1, axis=0)).any(axis=1)] if len(ring) > 1 else ring
 
 
-def _polygon(node: _Node, building: _Building, what: str) -> np.ndarray | None:
+def _polygon(node: Node, building: _Building, what: str) -> np.ndarray | None:
     """The polygon of a surface or an opening [m]; None, and the reason in `skipped`, if it has none with an area."""
     loops = node.all("PlanarGeometry", "PolyLoop")
     why = "no polygon" if not loops else ""
@@ -216,7 +209,7 @@ def _off(ring: np.ndarray, points: np.ndarray) -> float:
     return float(np.abs((points - ring.mean(axis=0)) @ normal).max() / np.linalg.norm(normal))
 
 
-def _add_surface(node: _Node, building: _Building) -> None:
+def _add_surface(node: Node, building: _Building) -> None:
     kind, key = node.get("surfaceType"), node.get("id")
     name = node.text("Name") or key
     what = f"surface {key or name!r}"
@@ -224,10 +217,12 @@ def _add_surface(node: _Node, building: _Building) -> None:
     outer = _polygon(node, building, what)
     if outer is None:
         return
-    for place, space in enumerate(node.all("AdjacentSpaceId")[:2]):
-        building.sides.setdefault(space.get("spaceIdRef"), []).append(outer[::-1] if place else outer)
+    spaces = tuple(space.get("spaceIdRef") for space in node.all("AdjacentSpaceId")[:2])
+    for place, space in enumerate(spaces):
+        building.sides.setdefault(space, []).append(outer[::-1] if place else outer)
     # An opening is there even where its surface is air.
-    holes = [hole for opening in node.all("Opening") if (hole := _add_opening(opening, outer, what, building))]
+    openings = node.all("Opening")
+    holes = [hole for opening in openings if (hole := _add_opening(opening, outer, what, spaces, building))]
     if kind == AIR:
         return
     text = f"{name} {node.text('CADObjectId')}"
@@ -242,7 +237,7 @@ def _add_surface(node: _Node, building: _Building) -> None:
     wanted = np.linalg.norm(newell(outer)) - sum(np.linalg.norm(newell(ring)) for (ring,) in holes)
     if abs(left - wanted) > BEYOND_SHARE * np.linalg.norm(newell(outer)):
         building.fault("a polygon that crosses itself, or openings that overlap or reach beyond it", what)
-    _add_part(building, name, key, kind, _role(kind, text, what, building), vertices, faces)
+    _add_part(building, node, kind, _role(kind, text, what, building), spaces, vertices, faces)
 
 
 def _role(kind: str, text: str, what: str, building: _Building) -> Taken:
@@ -255,7 +250,9 @@ def _role(kind: str, text: str, what: str, building: _Building) -> Taken:
     return Taken(Role.DETAIL, kind or "Surface")
 
 
-def _add_opening(node: _Node, outer: np.ndarray, where: str, building: _Building) -> tuple[np.ndarray] | None:
+def _add_opening(
+    node: Node, outer: np.ndarray, where: str, spaces: tuple[str, ...], building: _Building
+) -> tuple[np.ndarray] | None:
     """Add a window or door; its polygon is what is to be cut from the surface."""
     kind, key = node.get("openingType"), node.get("id")
     name = node.text("Name") or key
@@ -280,19 +277,26 @@ def _add_opening(node: _Node, outer: np.ndarray, where: str, building: _Building
         if kind not in WINDOWS:
             building.fault(f"openingType {kind!r}, which gbXML does not know: taken for a window", what)
         taken = Taken(Role.TRANSPARENT, kind or "Opening", f"glass: openingType {kind}")
-    _add_part(building, name, key, kind or "Opening", taken, *ring_triangles(ring, []))
+    _add_part(building, node, kind or "Opening", taken, spaces, *ring_triangles(ring, []))
     return (ring,)
 
 
 def _add_part(
-    building: _Building, name: str, key: str, kind: str, taken: Taken, vertices: np.ndarray, faces: np.ndarray
+    building: _Building,
+    node: Node,
+    kind: str,
+    taken: Taken,
+    spaces: tuple[str, ...],
+    vertices: np.ndarray,
+    faces: np.ndarray,
 ) -> None:
-    place = len(building.model.parts)
+    name, key, place = node.text("Name") or node.get("id"), node.get("id"), len(building.model.parts)
     part = Part(name, kind or taken.kind, taken.role, place, vertices, faces, np.eye(4), guid=key, why=taken.why)
     building.model.parts.append(part)
+    building.beside.append((spaces, node.get("constructionIdRef")))
 
 
-def _gather_space(node: _Node, building: _Building) -> None:
+def _gather_space(node: Node, building: _Building) -> None:
     """The polygons of a space by its shell, or by the boundaries that it lists."""
     key = node.get("id")
     if key in building.names:
@@ -324,4 +328,5 @@ def _add_spaces(building: _Building) -> None:
         starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
         vertices = np.concatenate([vertices for vertices, _ in pieces])
         faces = np.concatenate([faces + start for (_, faces), start in zip(pieces, starts[:-1], strict=True)])
-        building.model.spaces.append(Space(name, vertices, faces.astype(np.int32)))
+        words = {"guid": key, "storey": building.words.storey_of(key)}
+        building.model.spaces.append(Space(name, vertices, faces.astype(np.int32), **words))

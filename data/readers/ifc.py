@@ -13,7 +13,8 @@ from ..errors import InputError
 from ..scene import LOST_ROOM, Scene, Space
 from .archive import only_file
 from .assemble import Model, Part, assemble
-from .ifc_materials import associations, glass_material, type_of
+from .ifc_materials import associations, glass_material, material_names, type_of
+from .ifc_places import Places
 from .ifc_schema import check_classes
 from .ifc_shapes import Shape, keep_bodies, shape_alone, shapes_of
 from .roles import RoleRules, Taken
@@ -100,10 +101,10 @@ def _take_all(ifc: object, model: Model, roles: RoleRules) -> None:
             if alone is not None:
                 shapes[number] = alone
     order = sorted(shapes, key=lambda number: (products[number].GlobalId or "", number))
-    metres = _metres(ifc)
+    places = Places(_metres(ifc))
     for number in order:
-        _take(products[number], shapes[number], model, roles, metres)
-    _note_rooms(products, shapes, boxes, lost, model)
+        _take(products[number], shapes[number], model, roles, places)
+    _note_rooms(products, shapes, boxes, lost, model, places)
     _note_failures(products, shapes, lost, model)
     _note_others(products, shapes, model)
     _note_repeats([products[number] for number in order], model)
@@ -161,19 +162,24 @@ def _name(product: object) -> str:
     return product.Name or product.GlobalId or f"#{product.id()}"
 
 
-def _take(product: object, shape: Shape, model: Model, roles: RoleRules, metres: float) -> None:
+def _room(product: object, shape: Shape, places: Places) -> Space:
+    words = product.LongName or "", product.GlobalId or "", places.storey_of(product)
+    return Space(_name(product), shape.placed(), shape.faces, *words)
+
+
+def _take(product: object, shape: Shape, model: Model, roles: RoleRules, places: Places) -> None:
     """Add one product to the model as a space or an object, or to neither."""
     name, kind, guid = _name(product), product.is_a(), product.GlobalId or ""
     if product.is_a("IfcSpace"):
         if len(shape.faces):
-            model.spaces.append(Space(name, shape.placed(), shape.faces))
+            model.spaces.append(_room(product, shape, places))
         return
     if not _is_object(product):
         return
     if roles.leaves_out(name, guid, kind):
         model.skip(name, f"{kind}: left out as asked")
         return
-    taken = _taken(product, shape, roles, metres)
+    taken = _taken(product, shape, roles, places.metres)
     model.parts.append(
         Part(
             name,
@@ -186,6 +192,8 @@ def _take(product: object, shape: Shape, model: Model, roles: RoleRules, metres:
             guid=guid,
             why=taken.why,
             colours=shape.colours,
+            storey=places.storey_of(product),
+            materials=material_names(product),
         )
     )
 
@@ -229,7 +237,7 @@ def _room_boxes(products: dict) -> dict[int, Shape]:
     return found
 
 
-def _note_rooms(products: dict, shapes: dict, boxes: dict, lost: dict, model: Model) -> None:
+def _note_rooms(products: dict, shapes: dict, boxes: dict, lost: dict, model: Model, places: Places) -> None:
     """List the rooms without a body; where a bounding box is given it stands for the room."""
     rooms = [product for product in products.values() if product.is_a("IfcSpace")]
     for product in sorted(rooms, key=lambda product: (product.GlobalId or "", product.id())):
@@ -238,7 +246,7 @@ def _note_rooms(products: dict, shapes: dict, boxes: dict, lost: dict, model: Mo
             continue
         why = lost.get(number, "no representation" if product.Representation is None else _reason(product))
         if number in boxes:
-            model.spaces.append(Space(_name(product), boxes[number].placed(), boxes[number].faces))
+            model.spaces.append(_room(product, boxes[number], places))
             why += ": its bounding box stands for it"
         what = f"{LOST_ROOM}{_name(product)!r} (IfcSpace {product.GlobalId})"
         model.skip(what, f"a room without a body: {why}")

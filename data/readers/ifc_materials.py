@@ -1,10 +1,13 @@
-"""Glass told by what an IFC file says of materials: styles and names, in layers, lists, constituents and profiles."""
+"""What an IFC file says of materials, in layers, lists, constituents and profiles: their names, and which is glass."""
 
 from collections.abc import Iterator
 
 from .ifc_shapes import TRANSPARENCY
 from .roles import RoleRules
 
+# Attributes by which materials are made of others.
+PARTS = ("ForLayerSet", "MaterialLayers", "Materials", "MaterialConstituents", "MaterialProfiles", "ForProfileSet")
+PARTS += ("ForProfileEndSet", "Material")
 # Opaque layers up to this thickness, in metres, hide nothing of glass: foils and coats.
 FOIL_M = 0.005
 
@@ -22,6 +25,16 @@ def glass_material(product: object, roles: RoleRules, metres: float) -> str:
         if found:
             return next((why for material in found if (why := _glass(material, roles, metres))), "")
     return ""
+
+
+def material_names(product: object) -> tuple[str, ...]:
+    """Names of a product's own materials, else of its type's: each once, layers and parts in the file's order."""
+    for owner in (product, type_of(product)):
+        found = [link.RelatingMaterial for link in associations(owner)]
+        if found:
+            names = [one.Name for material in found for one in _single(material)]
+            return tuple(dict.fromkeys(filter(None, names)))
+    return ()
 
 
 def type_of(product: object) -> object | None:
@@ -63,7 +76,7 @@ def _single(material: object) -> Iterator[object]:
     if material.is_a("IfcMaterial"):
         yield material
         return
-    for name in ("Materials", "MaterialConstituents", "MaterialProfiles", "ForProfileSet", "Material"):
+    for name in PARTS:
         parts = getattr(material, name, None) or ()
         for part in parts if isinstance(parts, tuple) else (parts,):
             yield from _single(part)

@@ -23,7 +23,7 @@ from ..kept import kept_shares
 from ..rows import Rows
 from ..scene import Scene, turned
 from ..verdict import Verdict
-from . import certificates
+from . import certificates, room_tables
 from .graph_folder import CELL_COLUMNS, PORTAL_COLUMNS, plan_column, read_graph
 from .scene_folder import new_folder, read_manifest, read_table
 from .scene_tables import meshes_table, objects_table, scene_from_tables
@@ -35,6 +35,7 @@ CELL_LODS = ("cell_id", "object_id", "lod")
 # All that a bake folder may hold.
 TABLES = (
     *("meshes", "objects", "cells", "portals", "cell_to_cell", "cell_to_object", "cell_lods", "cracks", "leaks"),
+    *room_tables.TABLES,
     *certificates.TABLES,
 )
 LEAKS = ("cell_id", "reached_cell_id", "object_id")
@@ -110,6 +111,54 @@ class BakeFolder:
         if not path.exists():
             return pa.table({name: pa.array([], pa.int32()) for name in CELL_LODS})
         return read_table(path, CELL_LODS)
+
+    @cached_property
+    def rooms(self) -> pa.Table:
+        """Rooms that the model names, by room_id, one row each; none in a bake without rooms, and in older bakes.
+
+        Columns: name, long_name, guid, storey and elevation_m [m] as the model's file says them, null where it does
+        not; covered, the share of where eyes may be in it that its view cells hold, from 0 to 1; cells, its view cells,
+        a list of int32; claims_rooms, false where `room_to_room` hides nothing from it or of it.
+
+        Raises:
+            InputError: the table is unreadable.
+        """
+        return room_tables.read_room_table(self.folder, "rooms")
+
+    @cached_property
+    def room_to_object(self) -> pa.Table:
+        """What is seen from each room, the union over its view cells: room_id, object_id (int32) and verdict.
+
+        "visible" if any of its cells sees the object, else "unknown"; an object that is absent is hidden from all of
+        them, which says nothing of the part of the room that is not `covered`.
+
+        Raises:
+            InputError: the table is unreadable.
+        """
+        return room_tables.read_room_table(self.folder, "room_to_object")
+
+    @cached_property
+    def room_to_room(self) -> pa.Table:
+        """Which rooms each room reaches: room_id, reached_room_id (int32) and verdict.
+
+        "visible" if some of its cells sees some cell of the other, else "unknown"; absent is hidden, as above. Where
+        `claims_rooms` is false for one of the two, all is "unknown" that no cell shows: view cells at an angle, and
+        bakes of view cells, claim nothing of cells. A room that has cells sees itself.
+
+        Raises:
+            InputError: the table is unreadable.
+        """
+        return room_tables.read_room_table(self.folder, "room_to_room")
+
+    @cached_property
+    def rooms_of_cells(self) -> list[str]:
+        """Rooms of each cell in words, such as "A101 Foyer, Level 1"; the cell's own name where it has no room."""
+        return room_tables.words_of_cells(self.rooms, self.graph.cell_names)
+
+    def cell_text(self, cell: int) -> str:
+        """A cell's number and rooms, for messages: "12 (A101 Foyer, Level 1)"; the number alone where it has none."""
+        words = self.rooms_of_cells[cell]
+        return f"{cell} ({words})" if words else f"{cell}"
 
     @cached_property
     def cracks(self) -> np.ndarray:
@@ -220,6 +269,8 @@ def _check_ids(bake: BakeFolder) -> None:
             bad = sources[~bake.graph.inhabitable[sources]][0]
             where = bake.folder / f"{name}.parquet"
             raise InputError(f"{where}: expected rows of inhabitable cells only, found cell {bad}")
+    tables = {name: getattr(bake, name) for name in room_tables.TABLES}
+    room_tables.check_rooms(bake.folder, tables, bake.graph.inhabitable, limits["object_id"])
 
 
 def write_bake(

@@ -1,6 +1,7 @@
 """A bake-ready scene on disk: one folder of JSON and Parquet, whose tables the bake folder reuses.
 
-`manifest.json`, `meshes.parquet`, `objects.parquet`, `spaces.parquet`, `openings.parquet`. Vertices are stored as
+`manifest.json`, `meshes.parquet`, `objects.parquet`, `spaces.parquet`, `openings.parquet`, and `rooms.parquet`, which
+older folders lack and which says in words what `spaces.parquet` has as volumes, row by row. Vertices are stored as
 float32, so a mesh must hold values that float32 holds exactly: the snapped model is then the same before and after.
 """
 
@@ -17,7 +18,15 @@ import pyarrow.parquet as pq
 
 from ..errors import InputError
 from ..scene import Scene
-from .scene_tables import TABLE_COLUMNS, meshes_table, objects_table, openings_table, scene_from_tables, spaces_table
+from .scene_tables import (
+    TABLE_COLUMNS,
+    meshes_table,
+    objects_table,
+    openings_table,
+    rooms_table,
+    scene_from_tables,
+    spaces_table,
+)
 
 FORMAT = 1
 # Of bakes with view cells that are prisms: who reads them as boxes would claim too much.
@@ -42,9 +51,10 @@ def write_scene(scene: Scene, folder: str | Path) -> None:
         "objects": objects_table(scene),
         "spaces": spaces_table(scene.spaces),
         "openings": openings_table(scene.openings),
+        "rooms": rooms_table(scene.spaces),
     }
     manifest = scene_manifest(scene) | {"kind": "scene", "complete": True}
-    with new_folder(folder, "scene", TABLE_COLUMNS) as temporary:
+    with new_folder(folder, "scene", tables) as temporary:
         for name, table in tables.items():
             pq.write_table(table, temporary / f"{name}.parquet", compression="zstd")
         (temporary / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
@@ -62,6 +72,8 @@ def read_scene(folder: str | Path) -> Scene:
     if missing:
         raise InputError(f"{folder / 'manifest.json'}: expected the key {missing[0]!r}, found none")
     tables = {name: read_table(folder / f"{name}.parquet", columns) for name, columns in TABLE_COLUMNS.items()}
+    if (folder / "rooms.parquet").exists():
+        tables["rooms"] = read_table(folder / "rooms.parquet", ("room_id",))
     try:
         scene = scene_from_tables(manifest, **tables)
     except InputError as error:

@@ -8,8 +8,9 @@ import pyarrow as pa
 
 from ..errors import InputError
 from ..ragged import starts_of
-from ..scene import Definition, Instance, Mesh, Role, Scene, Space
+from ..scene import Definition, Instance, Mesh, NamedStorey, Role, Scene, Space
 
+STOREY_COLUMNS = ("storey", "elevation_m")
 BOX_COLUMNS = ("min_x", "min_y", "min_z", "max_x", "max_y", "max_z")
 TABLE_COLUMNS = {
     "meshes": ("definition_id", "lod", "error_m", "vertices", "faces"),
@@ -45,7 +46,10 @@ def meshes_table(scene: Scene) -> pa.Table:
 
 
 def objects_table(scene: Scene) -> pa.Table:
-    """`objects.parquet`: one row for each object; boxes in metres of the snapped model, null where nothing is left."""
+    """`objects.parquet`: one row for each object; boxes in metres of the snapped model, null where nothing is left.
+
+    `storey` and `elevation_m` are null where the file says none; `materials` is a list, empty where it says none.
+    """
     boxes = scene.object_bounds()
     columns = {
         "object_id": pa.array(range(len(scene.objects)), pa.int32()),
@@ -57,7 +61,31 @@ def objects_table(scene: Scene) -> pa.Table:
         "role": pa.array([placed.role.value for placed in scene.objects], pa.string()),
         "guid": pa.array([placed.guid or None for placed in scene.objects], pa.string()),
     }
-    return pa.table(columns | _box_columns(boxes * scene.grid_m, empty=boxes[:, 0, 0] > boxes[:, 1, 0]))
+    columns |= _box_columns(boxes * scene.grid_m, empty=boxes[:, 0, 0] > boxes[:, 1, 0])
+    columns |= storey_columns([placed.storey for placed in scene.objects])
+    columns["materials"] = pa.array([placed.materials for placed in scene.objects], pa.list_(pa.string()))
+    return pa.table(columns)
+
+
+def storey_columns(storeys: list[NamedStorey | None]) -> dict[str, pa.Array]:
+    """Names and elevations [m] of storeys; both null for None, the latter also where the file states none."""
+    found = [(None, None) if storey is None else (storey.name, storey.elevation_m) for storey in storeys]
+    kinds = pa.string(), pa.float64()
+    return {name: pa.array([pair[k] for pair in found], kinds[k]) for k, name in enumerate(STOREY_COLUMNS)}
+
+
+def rooms_table(spaces: list[Space]) -> pa.Table:
+    """`rooms.parquet`: one row for each room, by room_id, with what the model's file says of it in words.
+
+    Nulls stand for what it does not say.
+    """
+    columns = {
+        "room_id": pa.array(range(len(spaces)), pa.int32()),
+        "name": pa.array([space.name for space in spaces], pa.string()),
+        "long_name": pa.array([space.long_name or None for space in spaces], pa.string()),
+        "guid": pa.array([space.guid or None for space in spaces], pa.string()),
+    }
+    return pa.table(columns | storey_columns([space.storey for space in spaces]))
 
 
 def spaces_table(spaces: list[Space]) -> pa.Table:
@@ -82,8 +110,9 @@ def scene_from_tables(
     objects: pa.Table,
     spaces: pa.Table | None = None,
     openings: pa.Table | None = None,
+    rooms: pa.Table | None = None,
 ) -> Scene:
-    """The scene that a manifest and its tables describe; `spaces` and `openings` may be left out.
+    """The scene that a manifest and its tables describe; all but `meshes` and `objects` may be left out.
 
     Raises:
         InputError: the tables contradict each other or the manifest.
@@ -91,7 +120,7 @@ def scene_from_tables(
     scene = Scene(
         definitions=_definitions(meshes),
         objects=_objects(objects),
-        spaces=_spaces(spaces) if spaces is not None else [],
+        spaces=_spaces(spaces, rooms) if spaces is not None else [],
         openings=_openings(openings) if openings is not None else np.zeros((0, 2, 3)),
         origin=np.array(manifest["origin"], np.float64),
         yaw_deg=float(manifest.get("yaw_deg", 0.0)),
@@ -173,11 +202,11 @@ def _colours(meshes: pa.Table, faces: list[np.ndarray]) -> list[np.ndarray | Non
 
 def _objects(objects: pa.Table) -> list[Instance]:
     columns = ("object_id", "name", "kind", "definition_id", "role")
-    # Folders of before 0.2 have no GUIDs.
-    guids = objects["guid"].to_pylist() if "guid" in objects.column_names else [None] * objects.num_rows
-    rows = zip(*(objects[name].to_pylist() for name in columns), _arrays(objects["transform"], 4), guids, strict=True)
+    # Older folders have no GUIDs, storeys and materials.
+    words = optional(objects, "guid"), _storeys(objects), optional(objects, "materials")
+    rows = zip(*(objects[name].to_pylist() for name in columns), _arrays(objects["transform"], 4), *words, strict=True)
     found = []
-    for row, (object_id, name, kind, definition_id, role, transform, guid) in enumerate(rows):
+    for row, (object_id, name, kind, definition_id, role, transform, guid, storey, materials) in enumerate(rows):
         where = f"objects.parquet: row {row}"
         if object_id != row:
             raise InputError(f"{where}: expected object_id {row}, found {object_id}")
@@ -185,16 +214,35 @@ def _objects(objects: pa.Table) -> list[Instance]:
             raise InputError(f"{where}: expected role occluder, detail or transparent, found {role!r}")
         if transform.shape != (4, 4) or not np.isfinite(transform).all():
             raise InputError(f"{where}: expected a transform of 16 finite numbers, found {transform.size}")
-        found.append(Instance(name, kind, definition_id, transform.astype(np.float64), Role(role), guid or ""))
+        more = {"storey": storey, "materials": tuple(materials or ())}
+        found.append(Instance(name, kind, definition_id, transform.astype(np.float64), Role(role), guid or "", **more))
     return found
 
 
-def _spaces(spaces: pa.Table) -> list[Space]:
+def optional(table: pa.Table, name: str) -> list:
+    """Values of a column that older folders lack: then all None."""
+    return table[name].to_pylist() if name in table.column_names else [None] * table.num_rows
+
+
+def _storeys(table: pa.Table) -> list[NamedStorey | None]:
+    pairs = zip(*(optional(table, name) for name in STOREY_COLUMNS), strict=True)
+    return [None if name is None else NamedStorey(name, elevation) for name, elevation in pairs]
+
+
+def _spaces(spaces: pa.Table, rooms: pa.Table | None) -> list[Space]:
+    if rooms is None:
+        rooms = pa.table({"room_id": pa.array(range(spaces.num_rows))})
+    if rooms["room_id"].to_pylist() != list(range(spaces.num_rows)):
+        raise InputError(f"rooms.parquet: expected a row for each of {spaces.num_rows} rooms in order, found others")
     vertices, faces = _arrays(spaces["vertices"], 3), _arrays(spaces["faces"], 3)
     for row in range(spaces.num_rows):
         _check_faces(faces[row], len(vertices[row]), f"spaces.parquet: row {row}")
-    rows = zip(spaces["name"].to_pylist(), vertices, faces, strict=True)
-    return [Space(name, points.astype(np.float64), corners.astype(np.int32)) for name, points, corners in rows]
+    words = zip(*([text or "" for text in optional(rooms, name)] for name in ("long_name", "guid")), strict=True)
+    rows = zip(spaces["name"].to_pylist(), vertices, faces, words, _storeys(rooms), strict=True)
+    return [
+        Space(name, points.astype(np.float64), corners.astype(np.int32), *said, storey)
+        for name, points, corners, said, storey in rows
+    ]
 
 
 def _openings(openings: pa.Table) -> np.ndarray:

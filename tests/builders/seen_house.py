@@ -39,6 +39,19 @@ def seen_house(tmp_path):
     return made
 
 
+def with_rooms(made):
+    """The bake with two rooms: the hall, and a suite of the room and the study, cells 2 and 4."""
+    rows = [
+        dict(zip(made.rooms.column_names, values, strict=True))
+        for values in (
+            (0, "1", "Hall", "0BTBFw6f90Nfh9rP1dlXrr", "Ground", -0.5, 1.0, True, [0]),
+            (1, "suite", None, None, "Ground", -0.5, 0.9, True, [2, 4]),
+        )
+    ]
+    made.rooms = pa.Table.from_pylist(rows, schema=made.rooms.schema)
+    return made
+
+
 def forget(table, column, cell, target):
     rows = table.to_pylist()
     for row in rows:

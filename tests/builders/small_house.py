@@ -9,6 +9,7 @@ import pyarrow as pa
 from viewcell.data.graph import CellGraph
 from viewcell.data.scene import Definition, Instance, Mesh, Role, Scene
 from viewcell.data.store.bake_folder import BakeFolder
+from viewcell.data.store.room_tables import read_room_table
 from viewcell.data.verdict import Verdict
 from viewcell.verify.exact.stab import stab
 
@@ -37,6 +38,9 @@ class StandIn:
     claims_cells: bool = True
     in_model = BakeFolder.in_model
     yaw_deg: float = 0.0
+    rooms: pa.Table = field(default_factory=lambda: read_room_table(Path("none"), "rooms"))
+    rooms_of_cells = property(BakeFolder.rooms_of_cells.func)
+    cell_text = BakeFolder.cell_text
 
 
 def small_graph() -> CellGraph:

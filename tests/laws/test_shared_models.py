@@ -50,7 +50,10 @@ def check_ifc(name: str, expected: tuple, tmp_path: Path) -> None:
     assert scene.max_snap_m() <= GRID_M / 2
     assert path.read_bytes() == before
     write_scene(scene, tmp_path / name)
-    np.testing.assert_array_equal(read_scene(tmp_path / name).triangles()[0], scene.triangles()[0])
+    again = read_scene(tmp_path / name)
+    np.testing.assert_array_equal(again.triangles()[0], scene.triangles()[0])
+    told = [[(one.storey, one.materials) for one in made.objects] for made in (scene, again)]
+    assert told[0] == told[1] and any(storey for storey, _ in told[0])
 
 
 @pytest.mark.parametrize("name", IFC)

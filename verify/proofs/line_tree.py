@@ -73,7 +73,9 @@ def check_certificates(bake: "BakeFolder") -> Certified:
         good[row] = good[row] or hides(sources[cell[row]], ends[row], bool(closed[row]), words, blockers)
         found.leaves += sum(word < 0 for word in words)
     found.failed_proofs = int((~good).sum())
-    found.tell(f"proof {ids[row]}: cell {cell[row]} x {box_text(boxes[row])}" for row in np.flatnonzero(~good))
+    found.tell(
+        f"proof {ids[row]}: cell {bake.cell_text(cell[row])} x {box_text(boxes[row])}" for row in np.flatnonzero(~good)
+    )
     _check_objects(bake, cell[good & closed], [ends[row] for row in np.flatnonzero(good & closed)], found)
     if bake.claims_cells:
         whole = good & np.array([plan is None for plan in plans], bool)
@@ -259,7 +261,8 @@ def _check_cells(bake: "BakeFolder", cell: np.ndarray, boxes: np.ndarray, found:
     bad = np.argwhere(hidden & ~(proved | proved.T))
     found.covered += int(hidden.sum()) - len(bad)
     found.uncovered += len(bad)
-    found.tell(f"cell {a}, cell {b}: hidden, but in no box of a proof that holds" for a, b in bad)
+    named = bake.cell_text
+    found.tell(f"cell {named(a)}, cell {named(b)}: hidden, but in no box of a proof that holds" for a, b in bad)
 
 
 def _check_objects(bake: "BakeFolder", cell: np.ndarray, ends: list[End], found: Certified) -> None:
@@ -292,7 +295,8 @@ def _check_objects(bake: "BakeFolder", cell: np.ndarray, ends: list[End], found:
         found.covered += len(hidden)
     found.covered -= len(bad)
     found.uncovered += len(bad)
-    found.tell(f"cell {a}, object {b}: hidden, but not all of it in boxes of proofs that hold" for a, b in bad)
+    why = "hidden, but not all of it in boxes of proofs that hold"
+    found.tell(f"cell {bake.cell_text(a)}, object {b}: {why}" for a, b in bad)
 
 
 def _name(end: End) -> str:

@@ -4,6 +4,7 @@ A witness is `origin` and `direction` in metres; origin + direction (rounded to 
 Shares no code with the engines that found it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -59,11 +60,19 @@ class Confirmed:
         """Witnesses that do not."""
         return int(self.count[1:].sum())
 
-    def add(self, kind: str, cells: np.ndarray, targets: np.ndarray, reasons: np.ndarray) -> None:
-        """Count the outcomes of rows (cell, target) of one table."""
+    def add(
+        self,
+        kind: str,
+        cells: np.ndarray,
+        targets: np.ndarray,
+        reasons: np.ndarray,
+        cell_text: Callable[[int], str] = str,
+    ) -> None:
+        """Count the outcomes of rows (cell, target) of one table; `cell_text` is what cells are called in examples."""
         self.count += np.bincount(reasons, minlength=len(REASONS))
         for row in np.flatnonzero(reasons)[: 5 - len(self.examples)]:
-            self.examples.append(f"cell {cells[row]} sees {kind} {targets[row]}: {REASONS[reasons[row]]}")
+            target = cell_text(int(targets[row])) if kind == "cell" else targets[row]
+            self.examples.append(f"cell {cell_text(int(cells[row]))} sees {kind} {target}: {REASONS[reasons[row]]}")
 
 
 @dataclass(frozen=True)

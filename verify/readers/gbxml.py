@@ -10,6 +10,7 @@ import numpy as np
 
 from ...data.scene import Scene
 from .referee import Found, differences
+from .words import Told, word_differences
 
 METRES = {
     "kilometers": 1000.0,
@@ -43,7 +44,43 @@ def differences_gbxml(scene: Scene, path: Path) -> list[str]:
         count = named.count(name) + sum(f"{name!r} (Space " in what for what in lost)
         if count != wanted.count(name):
             lines.append(f"room {name!r}: expected {wanted.count(name)} as a second reader finds, found {count}")
-    return lines
+    return lines + word_differences(scene, *_told(root))
+
+
+def _told(root: ElementTree.Element) -> tuple[list[Told], list[Told]]:
+    """What the file says of surfaces and openings, and of spaces, of two of one id the first."""
+    metres = METRES[root.get("lengthUnit", "Meters").strip().lower()]
+    by_kind: dict[str, list[ElementTree.Element]] = {}
+    for element in root.iter():
+        by_kind.setdefault(element.tag.split("}")[-1], []).append(element)
+    ids = {kind: {one.get("id"): one for one in reversed(all_)} for kind, all_ in by_kind.items()}
+    storeys, spaces = ids.get("BuildingStorey", {}), ids.get("Space", {})
+
+    def storey_of(space: str | None) -> tuple[str, float | None] | None:
+        storey = storeys.get(spaces[space].get("buildingStoreyIdRef")) if space in spaces else None
+        if storey is None:
+            return None
+        level = (storey.findtext("{*}Level") or "").strip()
+        return (storey.findtext("{*}Name") or "").strip() or storey.get("id"), metres * float(level) if level else None
+
+    def names(owner: ElementTree.Element) -> Iterator[str]:
+        construction = ids.get("Construction", {}).get(owner.get("constructionIdRef"))
+        for layer in () if construction is None else construction.findall("{*}LayerId"):
+            for one in ids["Layer"][layer.get("layerIdRef")].findall("{*}MaterialId"):
+                material = ids["Material"][one.get("materialIdRef")]
+                yield (material.findtext("{*}Name") or "").strip() or material.get("id")
+
+    things = []
+    for surface in by_kind.get("Surface", []):
+        beside = [storey_of(space.get("spaceIdRef")) for space in surface.findall("{*}AdjacentSpaceId")[:2]]
+        storey = beside[0] if beside and all(one == beside[0] for one in beside) else None
+        for thing in (surface, *surface.findall("{*}Opening")):
+            things.append(Told(thing.get("id"), storey=storey, materials=tuple(dict.fromkeys(names(thing)))))
+    rooms = [
+        Told(key, (space.findtext("{*}Name") or "").strip() or key, storey=storey_of(key))
+        for key, space in spaces.items()
+    ]
+    return things, rooms
 
 
 def found_gbxml(path: Path) -> Iterator[Found]:

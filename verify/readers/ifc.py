@@ -11,6 +11,8 @@ import numpy as np
 from ...data.errors import InputError
 from ...data.scene import Definition, Instance, Mesh, Role, Scene
 from .referee import Found, differences
+from .step_words import StepWords
+from .words import word_differences
 
 NO_THINGS = (
     "IfcAnnotation IfcFeatureElement IfcGrid IfcPort IfcSpatialElement IfcSpatialStructureElement IfcStructuralItem "
@@ -28,7 +30,7 @@ NO_AREA = 1e-12
 
 
 def differences_ifc(scene: Scene, path: Path) -> list[str]:
-    """What a scene has otherwise than its file: objects and rooms that are lost, extra, moved or of another area.
+    """What a scene has otherwise than its file: objects and rooms lost, extra, moved, altered, or called otherwise.
 
     Args:
         scene: as read from the file, nothing left out.
@@ -38,7 +40,9 @@ def differences_ifc(scene: Scene, path: Path) -> list[str]:
         InputError: the file cannot be opened.
     """
     things = differences(scene, found_ifc(path))
-    return things + [f"room {line}" for line in differences(_of_rooms(scene), found_ifc(path, rooms=True))]
+    things += [f"room {line}" for line in differences(_of_rooms(scene), found_ifc(path, rooms=True))]
+    words = StepWords(_content(path))
+    return things + word_differences(scene, words.objects(), words.rooms())
 
 
 def found_ifc(path: Path, rooms: bool = False) -> Iterator[Found]:
@@ -57,13 +61,17 @@ def found_ifc(path: Path, rooms: bool = False) -> Iterator[Found]:
                 yield found
 
 
+def _content(path: Path) -> bytes:
+    if not is_zipfile(path):
+        return path.read_bytes()
+    with ZipFile(path) as archive:
+        return archive.read(next(name for name in archive.namelist() if name.lower().endswith(".ifc")))
+
+
 def _open(path: Path) -> object:
     import ifcopenshell
 
-    content = path.read_bytes()
-    if is_zipfile(path):
-        with ZipFile(path) as archive:
-            content = archive.read(next(name for name in archive.namelist() if name.lower().endswith(".ifc")))
+    content = _content(path)
     head, rest = content[:4096], content[4096:]
     for old in (b"IFC2X_FINAL", b"IFC2X2_FINAL"):
         head = head.replace(b"'" + old + b"'", b"'IFC2X3'").replace(b"'" + old.lower() + b"'", b"'IFC2X3'")

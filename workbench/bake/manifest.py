@@ -45,8 +45,10 @@ def fingerprint(scene: Scene | None, graph_folder: Path | None, settings: Settin
     for placed in scene.objects:
         digest.update(repr((placed.name, placed.kind, placed.definition_id, placed.role, placed.guid)).encode())
         digest.update(placed.transform.tobytes())
+        digest.update(repr((placed.storey, placed.materials)).encode())
     for space in scene.spaces:
         digest.update(space.name.encode() + space.vertices.tobytes() + space.faces.tobytes())
+        digest.update(repr((space.long_name, space.guid, space.storey)).encode())
     digest.update(np.ascontiguousarray(scene.openings).tobytes())
     digest.update(repr((scene.grid_m, scene.origin.tolist(), scene.yaw_deg)).encode())
     return digest.hexdigest()

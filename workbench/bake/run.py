@@ -14,10 +14,12 @@ from ...data.errors import InputError
 from ...data.graph import CellGraph
 from ...data.lod import object_errors, split_components
 from ...data.prepared import PreparedModel
+from ...data.rooms import join_rooms
 from ...data.rows import Rows
 from ...data.scene import Scene
 from ...data.store.bake_folder import CELL_LODS, leaks_table, portals_table, write_bake
 from ...data.store.certificates import certificate_tables, join_proofs
+from ...data.store.room_tables import room_tables
 from ...data.store.scene_folder import held_manifest
 from ...solvers.levels.pixel_error import pixel_levels
 from ..baked import Bake
@@ -183,6 +185,12 @@ def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dic
     if scene is not None and settings.lods:
         extra["cell_lods"] = _cell_lods(scene, graph, object_rows, settings)
         clock.lap("levels of detail")
+
+    if scene is not None and scene.spaces:
+        of_cells = {"named": not sources.view_cells, "claims": cell_rows is not None}
+        rooms = join_rooms(scene, graph, sources.model.closed, **of_cells)
+        extra |= room_tables(scene.spaces, rooms, (cell_rows, object_rows))
+        clock.lap("rooms")
 
     def manifest() -> dict:
         return bake_manifest(facts, settings, run.known, graph, (cell_rows, object_rows), clock)

@@ -74,6 +74,7 @@ def _wrong_table(result: CheckResult) -> pa.Table:
         "passes": pa.array([[result.object_names[k] for k, _ in w.nearest] for w in pairs], pa.list_(pa.string())),
         "clearances": pa.array([[d * step for _, d in w.nearest] for w in pairs], pa.list_(pa.float64())),
         "portals": pa.array([list(w.portals) for w in pairs], pa.list_(pa.int32())),
+        "cell_text": pa.array([result.cell_text(w.cell) for w in pairs], pa.string()),
     }
     return pa.table(columns)
 
@@ -131,7 +132,9 @@ def replay(folder: str | Path, model: str | Path | None = None) -> tuple[int, li
     lines = []
     for row, still in zip(rows.to_pylist(), clear, strict=True):
         state = "visible" if still else "no longer visible"
-        lines.append(f"{state}: cell {row['cell_id']}, {row['kind']} {row['target']} {row['target_name']!r}")
+        # Checks of before 0.2 do not say in which room a cell lies.
+        named = row.get("cell_text", row["cell_id"])
+        lines.append(f"{state}: cell {named}, {row['kind']} {row['target']} {row['target_name']!r}")
     return int(clear.sum()), [*lines, f"{int(clear.sum()):,} of {len(clear):,} sightlines are clear"]
 
 

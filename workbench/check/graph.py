@@ -59,6 +59,7 @@ def _compare(graph: CellGraph, claimed: np.ndarray, truth: BakeFolder, seconds: 
         cell_ids=np.arange(graph.cell_count),
         sources=np.flatnonzero(graph.inhabitable),
         object_names=[],
+        cell_rooms=[str(name) for name in graph.cell_names],
         claimed={"cell": claimed},
         seen={"cell": seen},
         exact=True,

@@ -17,6 +17,7 @@ from ...data.errors import InputError
 from ...data.graph import CellGraph
 from ...data.scene import OPAQUE, Role, Scene
 from ...data.store.claims import Claims, read_claims
+from ...data.store.room_tables import read_room_table, words_of_cells
 from ...data.store.scene_folder import read_manifest
 from ...data.store.view_cells import ViewCells, read_rows, view_cells
 from ...verify.check_result import CheckResult, WrongPair, counted
@@ -91,10 +92,14 @@ def check(
         result.asked = {"model": str(Path(model).resolve()), "judge": "portals"}
         return result
     scene, own_cells = opened
-    view = _view_cells(cells if cells is not None else own_cells, scene, str(model))
+    cells = cells if cells is not None else own_cells
+    view = _view_cells(cells, scene, str(model))
     names, guids = ([getattr(placed, of) for placed in scene.objects] for of in ("name", "guid"))
     claims = read_claims(_sources(pvs), view, names, targets, guids=guids)
     hunt = _Hunt(scene, view, claims, rays, seed)
+    baked = isinstance(cells, str | Path) and _is_bake(cells)
+    rooms = read_room_table(Path(cells), "rooms") if baked else None
+    hunt.result.cell_rooms = words_of_cells(rooms, view.graph.cell_names)
     hunt.result.seconds["read"] = time.perf_counter() - start
     hunt.run(progress)
     path = None if isinstance(model, Scene) else str(Path(model).resolve())

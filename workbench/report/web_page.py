@@ -18,6 +18,7 @@ import pyarrow as pa
 
 from ... import __version__
 from ...data.carving import find_faces
+from ...data.ragged import starts_of
 from ...data.scene import Role
 from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses
@@ -114,6 +115,7 @@ def page_data(
             "axis": pack(graph.portal_axis),
         },
         "objects": _objects(bake),
+        "rooms": _rooms(bake),
         "storeys": _storeys(bake, storeys),
         "cellRows": _packed_rows(table_rows(bake, "cell")),
         "objectRows": _packed_rows(table_rows(bake, "object")),
@@ -177,10 +179,30 @@ def _objects(bake: "BakeFolder") -> dict:
     return {
         "boxes": pack(boxes),
         "names": pack_json([o.name for o in objects]),
+        "guids": pack_json([o.guid for o in objects]),
         "kinds": [str(k) for k in kinds],
         "kind": pack(kind),
         "role": pack(np.array([ROLES.index(o.role) for o in objects], np.int64)),
     }
+
+
+def _rooms(bake: "BakeFolder") -> dict:
+    """What each room is called, how much of it its view cells hold, and which these are: its set is their union."""
+    rooms = bake.rooms.to_pylist()
+    words = [
+        {
+            "name": room["name"] or "",
+            "longName": room["long_name"] or "",
+            "guid": room["guid"] or "",
+            "storey": room["storey"] or "",
+            "elevation": room["elevation_m"],
+            "covered": room["covered"],
+        }
+        for room in rooms
+    ]
+    starts = starts_of([len(room["cells"]) for room in rooms])
+    cells = np.array([cell for room in rooms for cell in room["cells"]], np.int64)
+    return {"words": pack_json(words), "starts": pack(starts), "cells": pack(cells)}
 
 
 def _storeys(bake: "BakeFolder", storeys: list[Storey]) -> list[dict]:

@@ -11,7 +11,7 @@ from builders.gbxml_house import OPENINGS, SIDES, gbxml
 from builders.mutated import mutated
 from viewcell.data.errors import InputError
 from viewcell.data.readers import read
-from viewcell.data.scene import Role, Scene
+from viewcell.data.scene import NamedStorey, Role, Scene
 
 
 def write(path: Path, text: str) -> Path:
@@ -258,3 +258,21 @@ def test_a_damaged_file_is_a_scene_or_one_line(tmp_path, seed):
         assert "\n" not in str(error)
     else:
         assert scene.objects
+
+
+def test_storeys_and_materials_are_those_of_the_file(tmp_path):
+    """Of a surface between two storeys none is said; a height that is no number is none."""
+    path = tmp_path / "a.xml"
+    path.write_text(gbxml(unit='lengthUnit="Feet"', told=True))
+    scene = read(path)
+    found = {placed.guid: (placed.storey, placed.materials) for placed in scene.objects}
+    ground = NamedStorey("Ground", -1.5 * 0.3048)
+    wall = ("brick & clay", "m2")
+    sides = dict.fromkeys(("floor", "west", "east", "window", "door"), (ground, ()))
+    assert found == sides | {
+        "south": (ground, wall),
+        "north": (ground, wall),
+        "roof": (None, ()),
+        "shade": (None, ("brick & clay",)),
+    }
+    assert [(room.name, room.guid, room.storey) for room in scene.spaces] == [("kitchen", "s1", ground)]

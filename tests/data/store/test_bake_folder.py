@@ -19,6 +19,7 @@ COLUMNS = {
     "objects": [
         *("object_id", "name", "kind", "definition_id", "transform", "opaque", "role", "guid"),
         *("min_x", "min_y", "min_z", "max_x", "max_y", "max_z"),
+        *("storey", "elevation_m", "materials"),
     ],
     "cells": ["cell_id", "min_x", "min_y", "min_z", "max_x", "max_y", "max_z", "inhabitable", "name"],
     "portals": ["portal_id", "cell_a", "cell_b", "axis", "coordinate", "min_u", "max_u", "min_v", "max_v"],

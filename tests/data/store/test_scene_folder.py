@@ -6,7 +6,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from viewcell.data.errors import InputError
-from viewcell.data.scene import Definition, Instance, Mesh, Role, Scene, Space
+from viewcell.data.scene import Definition, Instance, Mesh, NamedStorey, Role, Scene, Space
 from viewcell.data.store.scene_folder import read_scene, write_scene
 from viewcell.data.store.scene_tables import meshes_table, objects_table, scene_from_tables
 
@@ -27,13 +27,18 @@ def random_scene(seed: int = 0) -> Scene:
         transform = np.eye(4)
         transform[:3, :3], transform[:3, 3] = turn, rng.uniform(-200, 200, 3)
         role = list(Role)[i % 3]
-        objects.append(Instance(f"object «{i}»", "IfcWall", i % 3, transform, role))
+        storey = (None, NamedStorey("ground"), NamedStorey("upper", 1 / 3))[i % 3]
+        told = {"storey": storey, "materials": ("brick", "it's «plaster»")[: i % 4]}
+        objects.append(Instance(f"object «{i}»", "IfcWall", i % 3, transform, role, **told))
     box = np.array([[0, 0, 0], [1 / 3, 0, 0], [0, 1, 0], [0, 0, 1.0]])
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32)
     return Scene(
         definitions,
         objects,
-        spaces=[Space("room 1", box, faces)],
+        spaces=[
+            Space("room 1", box, faces, "Stube", "0Lt8gR", NamedStorey("upper", -2.7)),
+            Space("room 2", box + 1, faces),
+        ],
         openings=np.array([[[0, 0, 0], [0.1, 1, 2]]]),
         origin=np.array([5.0e5, 40_000_001.0, 12.0]),  # the second is more than float32 can tell
         source="a test",
@@ -57,7 +62,7 @@ def assert_same(a: Scene, b: Scene) -> None:
     for x, y in zip(a.spaces, b.spaces, strict=True):
         np.testing.assert_array_equal(x.vertices, y.vertices)
         np.testing.assert_array_equal(x.faces, y.faces)
-        assert x.name == y.name
+        assert (x.name, x.long_name, x.guid, x.storey) == (y.name, y.long_name, y.guid, y.storey)
     np.testing.assert_array_equal(a.openings, b.openings)
     np.testing.assert_array_equal(a.origin, b.origin)
     assert (a.grid_m, a.source, a.sha256, a.unit, a.skipped) == (b.grid_m, b.source, b.sha256, b.unit, b.skipped)
@@ -68,6 +73,17 @@ def test_round_trip_changes_nothing(tmp_path):
     write_scene(scene, tmp_path / "a.scene")
     assert_same(read_scene(tmp_path / "a.scene"), scene)
     assert [path.name for path in tmp_path.iterdir()] == ["a.scene"]
+
+
+def test_older_folders_say_nothing_of_storeys_and_materials(tmp_path):
+    write_scene(random_scene(), tmp_path / "a")
+    (tmp_path / "a" / "rooms.parquet").unlink()
+    objects = pq.read_table(tmp_path / "a" / "objects.parquet")
+    pq.write_table(objects.drop_columns(["storey", "elevation_m", "materials"]), tmp_path / "a" / "objects.parquet")
+    found, wanted = read_scene(tmp_path / "a"), random_scene()
+    wanted.objects = [replace(placed, storey=None, materials=()) for placed in wanted.objects]
+    wanted.spaces = [Space(space.name, space.vertices, space.faces) for space in wanted.spaces]
+    assert_same(found, wanted)
 
 
 def test_tables_alone_give_the_scene_back():
@@ -165,6 +181,7 @@ BREAKS = {
     "expected a transform of 16": lambda f: change_table(f / "objects.parquet", transform=[[0.0] * 12] * 20),
     "expected rows in order": lambda f: change_table(f / "meshes.parquet", lod=[1] * 6),
     "expected vertex indices below 12": lambda f: change_table(f / "meshes.parquet", faces=[[0, 1, 99]] * 6),
+    "expected a row for each of 2 rooms": lambda f: change_table(f / "rooms.parquet", room_id=[0, 0]),
     "multiple of 3": lambda f: change_table(f / "meshes.parquet", faces=[[0, 1]] * 6),
 }
 

@@ -4,6 +4,7 @@ import pytest
 from builders.awkward import GBXML_MODELS
 from builders.gbxml_house import OPENINGS, gbxml
 from viewcell.data.readers import read
+from viewcell.data.scene import NamedStorey
 from viewcell.verify.readers.gbxml import differences_gbxml
 
 MODELS = [
@@ -56,3 +57,18 @@ def test_faults_are_named(tmp_path):
     definitions[south] = replace(definitions[south], lods=(replace(mesh, faces=mesh.faces[:-1]),))
     (line,) = differences_gbxml(replace(scene, definitions=definitions), path)
     assert "'south'" in line
+
+
+def test_words_that_differ_are_named(tmp_path):
+    path = tmp_path / "a.xml"
+    path.write_text(gbxml(unit='lengthUnit="Feet"', told=True).replace("<Level>low</Level>", ""))
+    scene = read(path)
+    assert differences_gbxml(scene, path) == []
+    first, *others = scene.objects
+    for changed in (replace(first, storey=None), replace(first, materials=("brick",))):
+        (line,) = differences_gbxml(replace(scene, objects=[changed, *others]), path)
+        assert line.startswith(f"{first.guid!r}: expected") and "Ground" in line
+    (room,) = scene.spaces
+    for changed in (replace(room, storey=NamedStorey("Ground", 0.0)), replace(room, long_name="x")):
+        (line,) = differences_gbxml(replace(scene, spaces=[changed]), path)
+        assert line.startswith("room 's1': expected the names 'kitchen' and ''")

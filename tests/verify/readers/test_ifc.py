@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders.awkward import IFC_CASES, IFC_MODELS, ifc_case
-from builders.step_house import house
+from builders.step_house import house, told_house
 from viewcell.data.readers import read
-from viewcell.data.scene import Scene
+from viewcell.data.scene import NamedStorey, Scene
 from viewcell.verify.readers.ifc import differences_ifc
 
 REFUSED = {"cut": {}, "noproject": {}, "stray": {}}
@@ -85,3 +85,21 @@ def test_a_lost_and_a_moved_room_are_named(pair):
     (room,) = scene.spaces
     (line,) = differences_ifc(replace(scene, spaces=[replace(room, vertices=room.vertices + 1)]), path)
     assert "box" in line
+
+
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
+def test_words_that_differ_are_named(schema, tmp_path):
+    path = told_house(schema).write(tmp_path / "a.ifc")
+    scene = read(path)
+    assert differences_ifc(scene, path) == []
+    for place, one in enumerate(scene.objects):
+        others = scene.objects[:place] + scene.objects[place + 1 :]
+        moved_up = NamedStorey(one.storey.name, 7.0) if one.storey else NamedStorey("cellar")
+        for changed in (replace(one, storey=moved_up), replace(one, materials=("cheese",))):
+            (line,) = differences_ifc(with_objects(scene, [*others, changed]), path)
+            assert line.startswith(f"{one.guid!r}: expected")
+    (room,) = scene.spaces
+    (line,) = differences_ifc(replace(scene, spaces=[replace(room, long_name="Stube")]), path)
+    assert line.startswith(f"room {room.guid!r}: expected the names 'room' and 'Stube ")
+    (line,) = differences_ifc(replace(scene, spaces=[replace(room, storey=None)]), path)
+    assert "found the names" in line and line.endswith("no storey")

@@ -1,6 +1,8 @@
 """Whole bakes: two-sided, symmetric, repeatable, resumable, and conservative against brute force."""
 
+import re
 import shutil
+from collections import Counter
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -9,9 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 import viewcell
 from builders import corridors, random_buildings
-from builders.places import SHARED
+from builders.places import ROOT, SHARED
 from builders.random_buildings import box_triangles as box
 from builders.random_buildings import scene_of, tetrahedron
+from builders.room_sets import assert_room_sets
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.scene import Role
@@ -24,6 +27,7 @@ from viewcell.workbench.baked import load
 
 METRE = 1024
 TABLES = ("cell_to_cell", "cell_to_object")
+ROOM_TABLES = ("rooms", "room_to_object", "room_to_room")
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +41,7 @@ def office_bake(office, tmp_path_factory):
 
 
 def same_tables(one, other):
-    return all(getattr(one, name).equals(getattr(other, name)) for name in (*TABLES,)) and all(
+    return all(getattr(one, name).equals(getattr(other, name)) for name in (*TABLES, *ROOM_TABLES)) and all(
         (one.folder / f"{name}.parquet").read_bytes() == (other.folder / f"{name}.parquet").read_bytes()
         for name in ("cells", "portals")
     )
@@ -72,6 +76,47 @@ def test_office_is_two_sided(office_bake):
     cell = int(np.flatnonzero(office_bake.graph.inhabitable)[0])
     assert set(office_bake.seen(cell)) <= set(office_bake.potential(cell))
     assert 0 < len(office_bake.potential(cell)) < counts["objects"]
+
+
+def test_rooms_see_what_their_cells_see(office, office_bake):
+    assert_room_sets(office_bake)
+    rooms = office_bake.rooms
+    assert rooms["name"].to_pylist() == [space.name for space in office.spaces] and rooms["claims_rooms"].to_pylist()
+    # Every inhabitable cell belongs to the room that it is called after, and rooms do not see all of each other.
+    names = office_bake.graph.cell_names
+    assert {cell for own in rooms["cells"].to_pylist() for cell in own} == set(np.flatnonzero(names != "").tolist())
+    for row in rooms.to_pylist():
+        assert row["covered"] > 0.95 and {names[cell] for cell in row["cells"]} == {row["name"]}
+    assert office_bake.room_to_room.num_rows < rooms.num_rows**2
+
+
+def test_the_joins_of_the_guide_are_right(office_bake, capsys):
+    """docs/bim.md, run as it stands, against plain loops over the tables."""
+    page = (ROOT / "docs" / "bim.md").read_text(encoding="utf-8")
+    codes = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    made = []
+    for code in codes:
+        made.append({})
+        exec(code.replace("house.bake", office_bake.folder.as_posix()), made[-1])
+    assert len(made) == 3 and capsys.readouterr().out.count("\n") == 3
+    names = office_bake.rooms["name"].to_pylist()
+    objects, rows = office_bake.scene.objects, office_bake.room_to_object.to_pylist()
+    own = Counter((objects[r["object_id"]].kind, r["verdict"]) for r in rows if names[r["room_id"]] == "1.101 office")
+    assert own and Counter((row["kind"], row["verdict"]) for row in made[0]["found"].to_pylist()) == own
+    pairs = [(names[row["room_id"]], names[row["reached_room_id"]]) for row in office_bake.room_to_room.to_pylist()]
+    reached = [(row["name"], row["reached"]) for row in made[1]["named"].to_pylist()]
+    assert reached and sorted(reached) == sorted((a, b) for a, b in pairs if a != b)
+    doors = [(r["object_id"], names[r["room_id"]]) for r in rows if objects[r["object_id"]].kind == "IfcDoor"]
+    assert doors and sorted((row["object_id"], row["room"]) for row in made[2]["touched"].to_pylist()) == sorted(doors)
+
+
+def test_rooms_of_a_bake_of_view_cells_claim_nothing_of_each_other(office, tmp_path):
+    options = {"cells": "octree", "cell_size_m": 6.0, "depth": 0, "method": "occluders"}
+    made = viewcell.bake(office, tmp_path / "views", settings=Settings(**options))
+    assert_room_sets(made)
+    assert not any(made.rooms["claims_rooms"].to_pylist()) and made.room_to_room.num_rows == made.rooms.num_rows**2
+    # Cells reach over walls, so a room has more of them than it fills; all of it lies in some.
+    assert min(made.rooms["covered"].to_pylist()) > 0.95
 
 
 @pytest.mark.parametrize(("name", "rows"), [("office", None), ("w48", round(38.42857 * 182))])
@@ -481,5 +526,8 @@ def test_shared_duplex(tmp_path):
     print(f"overestimate: cells {inhabitable.overestimate:.3f}, objects {objects.overestimate:.3f}")
     # Two stairwells and the roof are view cells too: of their pairs more are open than elsewhere.
     assert inhabitable.overestimate < 1.2 and objects.overestimate < 1.15
+    assert_room_sets(bake)
+    foyer = bake.rooms.to_pylist()[bake.rooms["name"].to_pylist().index("A101")]
+    assert (foyer["long_name"], foyer["guid"], foyer["storey"]) == ("Foyer", "0BTBFw6f90Nfh9rP1dlXrr", "Level 1")
     again = viewcell.bake(model, tmp_path / "again", threads=1)
     assert same_tables(again, bake)

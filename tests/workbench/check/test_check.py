@@ -92,7 +92,9 @@ def test_every_omission_is_found(house, claims, kind):
         assert not result.ok and result.confidence_line() == "none: the claims are refuted"
         assert result.wrong[0].margin > 0
         text = result.table()
-        assert f"cell {pair[0]} sees {kind} {pair[1]}" in text and "clear of everything by" in text
+        called = house.graph.cell_names
+        seen = f"cell {pair[1]} ({called[pair[1]]})" if kind == "cell" and called[pair[1]] else f"{kind} {pair[1]}"
+        assert f"cell {pair[0]} ({called[pair[0]]}) sees {seen}" in text and "clear of everything by" in text
 
 
 def test_the_order_of_cells_and_names_do_not_matter(house, claims):
@@ -438,6 +440,12 @@ def test_a_bake_of_prisms_alone_stands_by_its_claims_of_objects(tmp_path):
     baked = turned_house.turned_bake(tmp_path / "turned.bake")
     result = check(baked.scene, baked.folder, baked.folder, rays=RAYS)
     assert result.ok and result.rays and list(result.claimed) == ["object"]
+    # Cells are called by their rooms, which the bake knows more of than a table of boxes does.
+    rooms = baked.rooms.to_pylist()
+    rooms[1] |= {"long_name": "Stube", "storey": "EG"}
+    pq.write_table(pa.Table.from_pylist(rooms, schema=baked.rooms.schema), baked.folder / "rooms.parquet")
+    (cell,) = rooms[1]["cells"]
+    assert f"| {cell} (room 1 Stube, EG) |" in check(baked.scene, baked.folder, baked.folder, rays=1000).table()
 
 
 @pytest.mark.slow

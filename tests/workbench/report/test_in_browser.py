@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from builders.seen_house import CURVES, views_only
+from builders.seen_house import CURVES, views_only, with_rooms
 from viewcell.workbench.curves.series import Curves
 from viewcell.workbench.report.web_page import page
 
@@ -171,6 +171,23 @@ def test_a_browser_obeys_lists_tables_and_keys(browser, house, tmp_path):
     # Curves: the front leaves out the slow, loose point and what hides visible things.
     assert len(browser.find_elements("css selector", "#curves .on-front")) == 2
     assert "sampling" not in shown.text("#curves svg")
+    assert not shown.complaints()
+
+
+def test_a_browser_shows_what_a_room_sees(browser, house, tmp_path):
+    """The room is found by its name; its view cells are the source, and their sets together are shown."""
+    shown = Page(browser, with_rooms(house), tmp_path)
+    cells = house.graph.cells
+    shown.one("#portals").click()
+    shown.one("#search").send_keys("suite")
+    shown.one("#found button").click()
+    shown.settle()
+    assert shown.text("#cell-title") == "Room suite, Ground"
+    assert "2 view cells (2, 4) together; they hold 90 %" in shown.text("#cell-facts")
+    assert shown.numbers()["Objects"][0] == house.potential_objects[[2, 4]].any(axis=0).sum()
+    wanted = int((house.potential_cells[[2, 4]].any(axis=0) & house.graph.inhabitable).sum())
+    assert shown.numbers()["Inhabitable cells"][0] == wanted
+    assert all("#d55e00" in shown.colours(cells[cell]) for cell in (2, 4)) and "#a9d8f3" in shown.colours(cells[0])
     assert not shown.complaints()
 
 

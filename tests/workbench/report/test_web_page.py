@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from builders import small_house
 from builders.places import ROOT
-from builders.seen_house import CURVES, GRID, views_only
+from builders.seen_house import CURVES, GRID, views_only, with_rooms
 from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.errors import InputError
@@ -109,6 +109,20 @@ def test_a_page_too_large_keeps_all_verdicts_and_the_largest_sightlines(house, m
     monkeypatch.setattr(report_page, "CROSSINGS_MOST", 3)
     cells = table_rows(house, "cell")
     assert cells.crossings.sum() == len(cells.portals) <= 3 and (cells.codes == 2).any()
+
+
+def test_the_page_holds_the_rooms_and_their_view_cells(house):
+    assert content(page(house, "house"))["rooms"]["words"] == []
+    house.scene.objects[3] = replace(house.scene.objects[3], guid="2O2Fr$t4X7Zf8NOew3FLKr")
+    found = content(page(with_rooms(house), "house"))
+    hall, suite = found["rooms"]["words"]
+    assert hall == {
+        **{"name": "1", "longName": "Hall", "guid": "0BTBFw6f90Nfh9rP1dlXrr", "storey": "Ground"},
+        **{"elevation": -0.5, "covered": 1.0},
+    }
+    assert (suite["name"], suite["longName"], suite["guid"]) == ("suite", "", "")
+    assert found["rooms"]["starts"].tolist() == [0, 1, 3] and found["rooms"]["cells"].tolist() == [0, 2, 4]
+    assert found["objects"]["guids"][2:4] == ["", "2O2Fr$t4X7Zf8NOew3FLKr"]
 
 
 def test_the_page_loads_nothing(house):

@@ -6,7 +6,8 @@ const SERIES = ["#0072b2", "#d55e00", "#009e73", "#a8437c", "#555555", "#56b4e9"
 const MARKS = ["", "-5,-5 5,-5 5,5 -5,5", "0,-7 6,5 -6,5", "0,-7 6,0 0,7 -6,0", "-6,-5 6,-5 0,7"];
 // The picture's size, and where its axes end [pixels].
 const PLOT = { width: 1000, height: 520, left: 76, right: 700, top: 16, bottom: 468 };
-const GRID = "#e1e6ea";
+// Halfway clear, for light and dark paper.
+const GRID = "#7b858f55";
 const HEAD = ["method", "knob", "value", "seconds", "error", "unknown", "wrong-hidden", "on the front"];
 // The error axis is logarithmic above 1; an exact result has a place on it all the same.
 const EXACT = 1e-4;
@@ -75,7 +76,7 @@ function curvePicture(series) {
   const svg = shape("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": about });
   drawAxes(svg, across, up);
   const steps = frontOf(series).map((p, n) => (n ? `H${at(p)[0]}V${at(p)[1]}` : `M${at(p).join(" ")}`)).join("");
-  const heavy = { fill: "none", stroke: "#111", "stroke-width": 3, "stroke-opacity": 0.8 };
+  const heavy = { fill: "none", stroke: "currentColor", "stroke-width": 3, "stroke-opacity": 0.8 };
   svg.append(shape("path", { d: `${steps}H${right}`, ...heavy }));
   const methods = [...new Set(series.map((one) => one.method))];
   series.forEach((one, n) => {
@@ -86,7 +87,7 @@ function curvePicture(series) {
     if (one.knob !== "no knob") svg.append(words(right + 40, y + 19, one.knob, { class: "knob" }));
   });
   const y = top + 16 + 34 * series.length;
-  svg.append(rule(right + 16, right + 36, y, y, "#111", { "stroke-width": 3 }));
+  svg.append(rule(right + 16, right + 36, y, y, "currentColor", { "stroke-width": 3 }));
   svg.append(words(right + 40, y + 4, "Pareto front"));
   return svg;
 }

@@ -8,6 +8,8 @@ export const SEEN = 2;
 export const WORD = ["hidden", "unknown", "seen", "unclaimed"];
 // Of cells that a prism sees, or that see a prism, nothing is claimed.
 export const UNCLAIMED = 3;
+// Of two verdicts on one target from cells of a room the one that ranks higher is the room's.
+const RANK = [0, 2, 3, 1];
 // Codes of the page's rows; what has no row is hidden.
 const ROW_UNKNOWN = 0;
 const ROW_SIGHTLINE = 1;
@@ -91,8 +93,9 @@ export class Bake {
     Object.assign(this, data);
     const { cells, facts, objects } = data,
       cellCount = cells.inhabitable.length,
-      objectCount = objects.names.length;
-    Object.assign(this, { cellCount, objectCount });
+      objectCount = objects.names.length,
+      roomCount = data.rooms.words.length;
+    Object.assign(this, { cellCount, objectCount, roomCount });
     const [ofCells, ofObjects] = [new Relation(data.cellRows, cellCount), new Relation(data.objectRows, objectCount)];
     this.relations = { cell: ofCells, object: ofObjects };
     this.boxes = { cell: cells.boxes, object: objects.boxes };
@@ -110,6 +113,22 @@ export class Bake {
     ofCells.fill(UNCLAIMED, cell < firstPlan ? firstPlan : 0);
     if (cell >= firstPlan) ofCells[cell] = SEEN;
     return { cell: ofCells, object: this.relations.object.verdicts(cell) };
+  }
+
+  /** View cells of a room. */
+  cellsOf(room) {
+    return Array.from(this.rooms.cells.subarray(this.rooms.starts[room], this.rooms.starts[room + 1]));
+  }
+
+  /** Verdicts of all targets from some view cells together: what any of them sees is seen. */
+  verdictsFrom(cells) {
+    const [first, ...others] = cells.map((cell) => this.verdicts(cell));
+    for (const kind of ["cell", "object"])
+      for (const { [kind]: found } of others)
+        found.forEach((verdict, id) => {
+          if (RANK[verdict] > RANK[first[kind][id]]) first[kind][id] = verdict;
+        });
+    return first;
   }
 
   box(kind, id) {

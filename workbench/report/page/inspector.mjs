@@ -1,7 +1,7 @@
 // The view cell and the chosen target in words and numbers.
 import { SEEN, UNKNOWN, WORD } from "./data.mjs";
 import { $, button, make, paragraph, tableCell } from "./dom.mjs";
-import { count, describe, label, nature, ratio, size } from "./words.mjs";
+import { count, describe, label, nature, ratio, roomName, size } from "./words.mjs";
 
 const VERDICT = ["HIDDEN", "UNKNOWN", "VISIBLE", "NOT CLAIMED"];
 const REASON = [
@@ -11,6 +11,9 @@ const REASON = [
   "one of the two stands at an angle, or follows a room: only objects are looked at from there.",
 ];
 const ELSEWHERE = "Its sightline is in the bake's folder; this page holds those to the largest targets only.";
+
+// View cells of a room that are named.
+const NUMBERED = 16;
 
 /** Classes of targets that are counted apart: name, kind, which of the kind, and how many there are. */
 export function classesOf({ cells, facts, sources, cellCount, objectCount }) {
@@ -28,20 +31,55 @@ export function keptWords({ objectCount, relations }, cell) {
   return `; keeps ${((100 * relations.object.numbers(cell).potential) / objectCount).toFixed(1)} % of the objects`;
 }
 
-/** Name, whereabouts and numbers of the view cell. */
-export function showCell({ bake, cell }) {
+/** Where a view cell lies, and how much it keeps. */
+function cellFacts(bake, cell) {
   const b = bake.box("cell", cell),
     [low, high] = [b[2], b[5]].map((z) => bake.metres(z).toFixed(2));
+  const where = `${bake.level} ${bake.cells.storey[cell]}; ${size(bake, b)}; z ${low} to ${high} m`;
+  return where + keptWords(bake, cell);
+}
+
+/** A room's view cells, how much of it they hold, and what it is by the model's file. */
+export function roomFacts(bake, room) {
+  const { covered, elevation, guid } = bake.rooms.words[room],
+    cells = bake.cellsOf(room),
+    one = cells.length === 1,
+    numbers = [...cells.slice(0, NUMBERED), ...(cells.length > NUMBERED ? ["..."] : [])].join(", ");
+  const words = [
+    `${count(cells.length)} view cell${one ? "" : "s"} (${numbers}) together`,
+    covered === null ? "" : `${one ? "it holds" : "they hold"} ${(100 * covered).toFixed(0)} % of where eyes may be in it`,
+    elevation === null ? "" : `storey at ${elevation.toFixed(2)} m by the file`,
+    guid,
+  ];
+  const silent = "some of them stand at an angle or follow the room: nothing is claimed of the cells that these see";
+  return [...words, silentFrom(bake, cells) ? silent : ""].filter(Boolean).join("; ");
+}
+
+/** Whether nothing is claimed of the cells that some of these see. */
+const silentFrom = ({ cells: { firstPlan } }, cells) => cells.some((cell) => cell >= firstPlan);
+
+/** How many of the chosen targets of a kind are potential, seen and unknown from where is looked from. */
+export function numbersFrom({ bake, cell, room, verdicts }, kind, chosen) {
+  if (room < 0) return bake.relations[kind].numbers(cell, chosen);
+  const found = [0, 0, 0, 0];
+  verdicts[kind].forEach((verdict, id) => (found[verdict] += chosen(id) ? 1 : 0));
+  const [unknown, seen] = [found[UNKNOWN], found[SEEN]],
+    potential = unknown + seen;
+  return { potential, seen, unknown, over: seen ? potential / seen : potential ? Infinity : 1 };
+}
+
+/** Name, whereabouts and numbers of the view cell, or of the room. */
+export function showCell(state) {
+  const { bake, cell, room } = state;
   $("cell-input").value = label(cell, bake.cells.names[cell]);
   $("picker-error").hidden = true;
-  $("cell-title").textContent = describe(bake, "cell", cell);
-  const where = `${bake.level} ${bake.cells.storey[cell]}; ${size(bake, b)}; z ${low} to ${high} m`;
-  $("cell-facts").textContent = where + keptWords(bake, cell);
+  $("cell-title").textContent = room < 0 ? describe(bake, "cell", cell) : `Room ${roomName(bake, room)}`;
+  $("cell-facts").textContent = room < 0 ? cellFacts(bake, cell) : roomFacts(bake, room);
   $("cell-numbers").tBodies[0].replaceChildren(
     ...classesOf(bake)
-      .filter(([, kind]) => kind === "object" || cell < bake.cells.firstPlan)
+      .filter(([, kind]) => kind === "object" || !silentFrom(bake, state.from))
       .flatMap(([name, kind, chosen, all]) => {
-      const n = bake.relations[kind].numbers(cell, chosen);
+      const n = numbersFrom(state, kind, chosen);
       const texts = [count(n.potential), count(n.seen), count(n.unknown), ratio(n.over)];
       const row = make("tr", { className: "with-bar" }, make("th", { scope: "row" }, name));
       row.append(...texts.map((text, k) => tableCell(text, { className: k === 3 ? "strong" : "" })));
@@ -64,11 +102,13 @@ function barRow(n, all, name) {
 }
 
 /** How many targets of the coloured kind are of each verdict on each storey; of cells, the inhabitable ones. */
-export function reached({ bake, cell, layer }) {
+export function reached({ bake, cell, layer, room, verdicts }) {
   const found = bake.storeys.map(() => [0, 0, 0]);
-  bake.relations[layer].each(cell, (id, verdict) => {
+  const add = (id, verdict) => {
     if (layer === "object" || bake.cells.inhabitable[id]) found[bake.storeyOf(layer, id)][verdict]++;
-  });
+  };
+  if (room < 0) bake.relations[layer].each(cell, add);
+  else verdicts[layer].forEach((verdict, id) => [UNKNOWN, SEEN].includes(verdict) && add(id, verdict));
   return found;
 }
 
@@ -123,9 +163,10 @@ export function pathOf({ portals }, cell, crossed) {
 
 /** Where the sightline to a seen target runs. */
 function sightWords(state, target) {
-  const { bake, cell } = state,
+  const { bake } = state,
+    cell = state.seenFrom(target),
     sight = state.sightline(target),
-    itself = target.kind === "cell" && target.id === cell;
+    itself = target.kind === "cell" && state.from.includes(target.id);
   if (!sight) return [paragraph("small", itself ? "A view cell sees itself." : ELSEWHERE)];
   const [a, b] = sight.ends,
     at = (p) => `(${bake.inModel(p).map((v) => v.toFixed(2)).join(", ")})`,

@@ -8,11 +8,11 @@ const ROWS_SHOWN = 12;
 // Columns of the table of view cells; a first click on one of the latter four sorts the largest first.
 const COLUMNS = ["cell", "name", "storey", "potential", "seen", "unknown", "over"];
 
-/** Ids of all targets of a kind by verdict; the view cell itself is left out. */
-export function targetsByVerdict({ cell, verdicts }, kind) {
+/** Ids of all targets of a kind by verdict; the view cells that are looked from are left out. */
+export function targetsByVerdict({ from, verdicts }, kind) {
   const found = [[], [], [], []];
   verdicts[kind].forEach((verdict, id) => {
-    if (kind !== "cell" || id !== cell) found[verdict].push(id);
+    if (kind !== "cell" || !from.includes(id)) found[verdict].push(id);
   });
   // Of the rest nothing is claimed.
   return found.slice(0, 3);

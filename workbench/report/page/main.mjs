@@ -8,6 +8,7 @@ import { findSource, markRow, markTarget, showList, showWorst, sortedCells } fro
 import { showNumbers } from "./numbers.mjs";
 import { Plan } from "./plan.mjs";
 import { listenTo } from "./pointing.mjs";
+import { wireSearch } from "./search.mjs";
 import { LISTED, State } from "./state.mjs";
 import { count, label } from "./words.mjs";
 
@@ -27,10 +28,10 @@ function showHead({ cellCount, facts, objectCount, portals, sources }) {
   document.querySelector("main").hidden = false;
 }
 
-/** The page's address names the view cell, so that a link leads back to it. */
-function showAddress({ cell }) {
+/** The page's address names the room or the view cell, so that a link leads back to it. */
+function showAddress({ cell, room }) {
   try {
-    history.replaceState(null, "", `#cell-${cell}`);
+    history.replaceState(null, "", room < 0 ? `#cell-${cell}` : `#room-${room}`);
   } catch {
     /* a sandboxed frame has no address of its own */
   }
@@ -130,12 +131,13 @@ async function start() {
   const state = new State(bake);
   new Plan($("plan"), state);
   listenTo($("plan"), state);
-  for (const wire of [wireTools, wirePicker, wireLists, wireViews]) wire(state);
+  for (const wire of [wireTools, wirePicker, wireSearch, wireLists, wireViews]) wire(state);
   showLegend(state);
   showWorst(state);
-  const linked = /^#cell-(\d+)$/.exec(location.hash);
-  const [worst] = sortedCells(bake, state.worstKind, state.sort);
-  state.pick(linked && bake.cells.inhabitable[Number(linked[1])] ? Number(linked[1]) : worst.cell);
+  const [, what, id] = /^#(cell|room)-(\d+)$/.exec(location.hash) ?? [],
+    [worst] = sortedCells(bake, state.worstKind, state.sort);
+  state.pick(what === "cell" && bake.cells.inhabitable[Number(id)] ? Number(id) : worst.cell);
+  if (what === "room" && Number(id) < bake.roomCount) state.pickRoom(Number(id));
   document.documentElement.dataset.ready = "yes";
 }
 

@@ -1,25 +1,19 @@
 // The plan of a storey, drawn on a canvas.
 import { boxAt, HIDDEN, SEEN, UNKNOWN, WORD } from "./data.mjs";
+import { ink, takeInk } from "./ink.mjs";
 import { cutBy, floorArea } from "./storeys.mjs";
 import { fitted, outOfSight, rectangle, scaleBar, toX, toY, wantedHeight } from "./view.mjs";
 
-const FILL = { room: "#fbf3e2", seen: "#a9d8f3", unknown: "#f6d38a", hidden: "#fff", other: "#fff", unclaimed: "#eceff1", source: "#d55e00" };
-const STROKE = { seen: "#0072b2", unknown: "#c27a00", hidden: "#a3acb4" };
-const ROOM_EDGE = { lineWidth: 0.9, strokeStyle: "#8a949d" };
-const OTHER_EDGE = { lineWidth: 0.4, strokeStyle: "#c4ccd3" };
-const PORTAL = "#007a58";
-const SIGHT = "#0072b2";
-const TARGET = "#a8437c";
-// Cut surfaces in the order of drawing: verdict or role of their object, colour, width and dashes.
+// Cut surfaces in the order of drawing: verdict or role of their object, its colour's name, width and dashes.
 const BY_VERDICT = [
-  [HIDDEN, STROKE.hidden, 1, []],
-  [SEEN, STROKE.seen, 2.2, []],
-  [UNKNOWN, STROKE.unknown, 2.6, [6, 4]],
+  [HIDDEN, "hiddenEdge", 1, []],
+  [SEEN, "seenEdge", 2.2, []],
+  [UNKNOWN, "unknownEdge", 2.6, [6, 4]],
 ];
 const BY_ROLE = [
-  [1, "#7d7268", 0.8, []],
-  [2, "#56a5cf", 1.4, []],
-  [0, "#20262c", 1.5, []],
+  [1, "detail", 0.8, []],
+  [2, "glass", 1.4, []],
+  [0, "wall", 1.5, []],
 ];
 
 /** The pattern of what is unknown. */
@@ -28,7 +22,7 @@ function makeHatch(pen, pixelRatio) {
   tile.width = tile.height = Math.round(8 * pixelRatio);
   const p = tile.getContext("2d"),
     n = tile.width;
-  p.strokeStyle = "#9a6700";
+  p.strokeStyle = ink.hatch;
   p.lineWidth = 1.3 * pixelRatio;
   for (const d of [-n, 0, n]) p.stroke(new Path2D(`M${d} ${n}L${d + n} 0`));
   const pattern = pen.createPattern(tile, "repeat");
@@ -38,14 +32,14 @@ function makeHatch(pen, pixelRatio) {
 
 /** Fills a path; what is unknown is hatched, too, and the view cell has a border. */
 function paintPath({ pen, hatch }, path, look) {
-  pen.fillStyle = FILL[look];
+  pen.fillStyle = ink[look];
   pen.fill(path);
   if (look === "unknown") {
     pen.fillStyle = hatch;
     pen.fill(path);
   }
   if (look === "source") {
-    Object.assign(pen, { lineWidth: 2.5, strokeStyle: "#111" });
+    Object.assign(pen, { lineWidth: 2.5, strokeStyle: ink.border });
     pen.stroke(path);
   }
 }
@@ -79,19 +73,19 @@ function drawCells(frame) {
     shown = inSight(frame, "cell"),
     cut = shown.filter(({ b }) => cutBy(b, storey)),
     apart = shown.filter(({ b }) => !cutBy(b, storey));
-  pen.fillStyle = bake.facts.claimsCells ? "#e1e6ea" : "#fff";
+  pen.fillStyle = bake.facts.claimsCells ? ink.ground : ink.paper;
   pen.fillRect(0, 0, view.width, view.height);
   for (const { id } of bake.facts.claimsCells ? [...apart, ...cut] : [])
     paintPath(frame, outlineOf(frame, "cell", id), coloured ? WORD[state.verdicts.cell[id]] : inhabitable[id] ? "room" : "other");
   for (const { id, b, r } of [...cut, ...apart]) {
     if (!inhabitable[id] && Math.min(r[2], r[3]) <= 1.5) continue;
-    Object.assign(pen, inhabitable[id] ? ROOM_EDGE : OTHER_EDGE);
+    Object.assign(pen, { lineWidth: inhabitable[id] ? 0.9 : 0.4, strokeStyle: inhabitable[id] ? ink.roomEdge : ink.otherEdge });
     pen.setLineDash(cutBy(b, storey) ? [] : [4, 3]);
     pen.stroke(outlineOf(frame, "cell", id));
   }
   pen.setLineDash([]);
-  const own = shown.find(({ id }) => id === state.cell);
-  if (coloured && own) paintPath(frame, outlineOf(frame, "cell", own.id), "source");
+  for (const { id } of coloured ? shown.filter(({ id }) => state.from.includes(id)) : [])
+    paintPath(frame, outlineOf(frame, "cell", id), "source");
 }
 
 function drawObjects(frame) {
@@ -101,7 +95,7 @@ function drawObjects(frame) {
   if (state.layer !== "object") return;
   const shown = inSight(frame, "object");
   for (const verdict of [HIDDEN, SEEN, UNKNOWN]) {
-    Object.assign(pen, { strokeStyle: STROKE[WORD[verdict]], lineWidth: verdict === HIDDEN ? 0.7 : 1.4 });
+    Object.assign(pen, { strokeStyle: ink[`${WORD[verdict]}Edge`], lineWidth: verdict === HIDDEN ? 0.7 : 1.4 });
     pen.setLineDash(verdict === UNKNOWN ? [5, 3] : []);
     for (const { id: object, b, r } of shown.filter(({ id }) => state.verdicts.object[id] === verdict)) {
       const small = floorArea(b) < large;
@@ -121,25 +115,26 @@ function drawSurfaces(frame) {
     { lines, owners, step } = storey;
   const [key, passes] = state.layer === "object" ? [state.verdicts.object, BY_VERDICT] : [bake.objects.role, BY_ROLE];
   pen.lineCap = "round";
-  for (const [value, strokeStyle, lineWidth, dashes] of passes) {
+  for (const [value, colour, lineWidth, dashes] of passes) {
     pen.beginPath();
     for (let n = 0; n < owners.length; n++) {
       if (key[owners[n]] !== value) continue;
       const [x, y, u, v] = [0, 1, 2, 3].map((k) => lines[4 * n + k] * step);
       addLine(frame, [x, y], [u, v]);
     }
-    Object.assign(pen, { strokeStyle, lineWidth });
+    Object.assign(pen, { strokeStyle: ink[colour], lineWidth });
     pen.setLineDash(dashes);
     pen.stroke();
   }
 }
 
-/** The view cell over coloured objects. */
+/** The view cells that are looked from, over coloured objects. */
 function drawSource(frame) {
-  const { pen, view, bake, state } = frame;
-  if (state.layer !== "object" || bake.cells.storey[state.cell] !== state.storey) return;
+  const { pen, bake, state } = frame;
+  if (state.layer !== "object") return;
   pen.globalAlpha = 0.55;
-  paintPath(frame, outlineOf(frame, "cell", state.cell), "source");
+  for (const cell of state.from.filter((one) => bake.cells.storey[one] === state.storey))
+    paintPath(frame, outlineOf(frame, "cell", cell), "source");
 }
 
 function strokePortal(frame, b, lineWidth) {
@@ -154,7 +149,7 @@ function drawPortals(frame) {
     { cells, portals } = bake;
   if (!state.portals) return;
   const entered = (cell) => cells.inhabitable[cell] && cutBy(bake.box("cell", cell), storey);
-  pen.strokeStyle = PORTAL;
+  pen.strokeStyle = ink.portal;
   for (let id = 0; id < portals.axis.length; id++) {
     const b = boxAt(portals.boxes, id);
     if (portals.axis[id] === 2) {
@@ -176,14 +171,15 @@ function drawSightlines(frame) {
   for (const kind of bake.kinds) {
     if (!state.lines[kind]) continue;
     const relation = bake.relations[kind],
-      targets = relation.numbers(state.cell).potential;
-    Object.assign(pen, { strokeStyle: SIGHT, lineWidth: kind === "cell" ? 0.9 : 0.6 });
+      targets = state.from.reduce((sum, cell) => sum + relation.numbers(cell).potential, 0);
+    Object.assign(pen, { strokeStyle: ink.sight, lineWidth: kind === "cell" ? 0.9 : 0.6 });
     pen.globalAlpha = Math.max(0.25, Math.min(0.8, 60 / Math.max(1, targets)));
     pen.beginPath();
-    relation.each(state.cell, (target, verdict, row) => {
-      const sight = relation.sightlineOf(row);
-      if (sight) addLine(frame, ...sight.ends);
-    });
+    for (const cell of state.from)
+      relation.each(cell, (target, verdict, row) => {
+        const sight = relation.sightlineOf(row);
+        if (sight) addLine(frame, ...sight.ends);
+      });
     pen.stroke();
   }
 }
@@ -216,7 +212,7 @@ export function placeLabels(frame, measure) {
 function drawLabels(frame) {
   const { pen } = frame;
   Object.assign(pen, { textAlign: "center", textBaseline: "middle", lineWidth: 3.5 });
-  Object.assign(pen, { strokeStyle: "rgba(255,255,255,.9)", fillStyle: "#1d2329" });
+  Object.assign(pen, { strokeStyle: ink.halo, fillStyle: ink.text });
   const measure = (text, font) => {
     pen.font = font;
     return pen.measureText(text).width;
@@ -235,13 +231,13 @@ function drawLabels(frame) {
 function drawTarget(frame, { kind, id }) {
   const { pen, view, bake, state } = frame,
     { portals } = bake;
-  Object.assign(pen, { strokeStyle: TARGET, lineWidth: 3 });
+  Object.assign(pen, { strokeStyle: ink.target, lineWidth: 3 });
   pen.setLineDash(bake.storeyOf(kind, id) === state.storey ? [] : [6, 4]);
   pen.strokeRect(...rectangle(view, bake.box(kind, id)));
   pen.setLineDash([]);
   const sight = state.sightline({ kind, id });
   if (!sight) return;
-  pen.strokeStyle = PORTAL;
+  pen.strokeStyle = ink.portal;
   for (const portal of sight.portals) {
     const b = boxAt(portals.boxes, portal);
     if (portals.axis[portal] === 2) {
@@ -249,8 +245,8 @@ function drawTarget(frame, { kind, id }) {
       pen.strokeRect(...rectangle(view, b));
     } else strokePortal(frame, b, 5);
   }
-  drawSight(frame, sight.ends, "#fff", 5);
-  drawSight(frame, sight.ends, TARGET, 2.4);
+  drawSight(frame, sight.ends, ink.halo, 5);
+  drawSight(frame, sight.ends, ink.target, 2.4);
   drawArrow(pen, ...sight.ends.map(([x, y]) => [toX(view, x), toY(view, y)]));
 }
 
@@ -282,9 +278,9 @@ function drawScale({ pen, view, bake }) {
   const { metres, wide } = scaleBar(view, bake.facts.gridMetres),
     x = 14,
     y = view.height - 16;
-  pen.fillStyle = "rgba(255,255,255,.88)";
+  pen.fillStyle = ink.halo;
   pen.fillRect(x - 7, y - 22, Math.max(wide, 36) + 14, 32);
-  Object.assign(pen, { fillStyle: "#20262c", font: "12px system-ui, sans-serif" });
+  Object.assign(pen, { fillStyle: ink.text, font: "12px system-ui, sans-serif" });
   pen.fillRect(x, y, wide, 3);
   pen.fillText(`${metres} m`, x, y - 6);
 }
@@ -300,8 +296,14 @@ export class Plan {
 
   constructor(canvas, state) {
     Object.assign(this, { canvas, state, pen: canvas.getContext("2d") });
-    state.on("cell storey layer lines portals target hover view", () => this.draw());
+    state.on("cell room storey layer lines portals target hover view", () => this.draw());
     new ResizeObserver(() => this.resize()).observe(canvas);
+    const dark = window.matchMedia("(prefers-color-scheme: dark)");
+    takeInk(dark.matches);
+    dark.addEventListener("change", () => {
+      takeInk(dark.matches);
+      this.resize();
+    });
   }
 
   /** Paints once before the browser shows its next picture, however often it is asked. */

@@ -3,7 +3,7 @@ import { WORD } from "./data.mjs";
 import { $ } from "./dom.mjs";
 import { neighbour, sourcesAt, targetAt } from "./storeys.mjs";
 import { groundAt, moved } from "./view.mjs";
-import { cellName, describe } from "./words.mjs";
+import { cellName, describe, roomName } from "./words.mjs";
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const KEYS = {
@@ -26,12 +26,14 @@ export function clickAt(state, px, py, asking) {
 }
 
 /** What the tip says of the target and the view cells under the pointer; nothing where there are none. */
-export function tipWords({ bake, cell, mode, verdicts }, target, under) {
-  const lines = [];
+export function tipWords({ bake, cell, from, mode, room, verdicts }, target, under) {
+  const lines = [],
+    own = under.find((one) => from.includes(one));
   if (target) {
     const verdict = WORD[verdicts[target.kind][target.id]].toUpperCase();
-    lines.push(describe(bake, target.kind, target.id), `${verdict} from view cell ${cell}`);
-  } else if (under.includes(cell)) lines.push(`The view cell, ${cellName(bake, cell)}`);
+    const whence = room < 0 ? `view cell ${cell}` : `room ${roomName(bake, room)}`;
+    lines.push(describe(bake, target.kind, target.id), `${verdict} from ${whence}`);
+  } else if (own !== undefined) lines.push(`${room < 0 ? "The view cell" : "A view cell of the room"}, ${cellName(bake, own)}`);
   if (under.length > 1 && mode === "pick")
     lines.push(`${under.length} view cells above each other: click again for the next`);
   return lines.join("\n");

@@ -11,7 +11,7 @@ export class State {
   /** Nothing is chosen yet: `pick` does that once all have said what they listen to. */
   constructor(bake) {
     const [kind] = bake.kinds;
-    Object.assign(this, { bake, storey: 0, cell: -1, target: null, hover: null, mode: "pick", layer: kind });
+    Object.assign(this, { bake, storey: 0, cell: -1, room: -1, target: null, hover: null, mode: "pick", layer: kind });
     Object.assign(this, { verdicts: null, lines: { cell: false, object: false }, portals: true });
     Object.assign(this, { listKind: kind, listVerdict: UNKNOWN, listed: LISTED });
     Object.assign(this, { worstKind: kind, sort: { key: "over", down: true }, allCells: false });
@@ -29,6 +29,20 @@ export class State {
     for (const { names, act } of this.#listeners) if (names.some((name) => name in fields)) act(this);
   }
 
+  /** The view cells that are looked from: the chosen one, or all of the chosen room. */
+  get from() {
+    return this.room < 0 ? [this.cell] : this.bake.cellsOf(this.room);
+  }
+
+  /** Chooses a room: what its view cells see together is shown; does nothing if it has none. */
+  pickRoom(room) {
+    const cells = this.bake.cellsOf(room),
+      [cell] = cells;
+    if (cell === undefined) return;
+    const storey = this.bake.cells.storey[cell];
+    this.set({ cell, room, verdicts: this.bake.verdictsFrom(cells), target: null, hover: null, listed: LISTED, storey });
+  }
+
   /** Chooses a view cell and, unless told to keep it, the cell's storey; does nothing if it is none. */
   pick(cell, { keepStorey = false } = {}) {
     const { cells } = this.bake;
@@ -36,7 +50,7 @@ export class State {
     const verdicts = this.bake.verdicts(cell);
     const moves = !keepStorey && cells.storey[cell] !== this.storey;
     const storey = moves ? { storey: cells.storey[cell] } : {};
-    this.set({ cell, verdicts, target: null, hover: null, listed: LISTED, ...storey });
+    this.set({ cell, room: -1, verdicts, target: null, hover: null, listed: LISTED, ...storey });
   }
 
   /** Chooses the view cell so many places on in the order of ids, round and round. */
@@ -50,9 +64,14 @@ export class State {
     this.set({ storey: Math.max(0, Math.min(this.bake.storeys.length - 1, storey)) });
   }
 
-  /** The sightline to a target {kind, id}, or null. */
-  sightline({ kind, id }) {
-    return this.bake.relations[kind].sightline(this.cell, id);
+  /** The view cell from which the page has a sightline to a target {kind, id}; the chosen one if there is none. */
+  seenFrom({ kind, id }) {
+    return this.from.find((cell) => this.bake.relations[kind].sightline(cell, id)) ?? this.cell;
+  }
+
+  /** The sightline to a target, or null. */
+  sightline(target) {
+    return this.bake.relations[target.kind].sightline(this.seenFrom(target), target.id);
   }
 
   fit() {

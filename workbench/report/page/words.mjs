@@ -17,6 +17,13 @@ export const label = (id, name) => (name ? `${id} · ${name}` : `${id}`);
 /** A cell's number and, if it has one, name. */
 export const cellName = ({ cells }, cell) => (cells.names[cell] ? `${cell} (${cells.names[cell]})` : `${cell}`);
 
+/** What a room is called: its names, and the storey that the model's file puts it on. */
+export function roomName({ rooms }, room) {
+  const { name, longName, storey } = rooms.words[room],
+    names = [...new Set([name, longName])].filter(Boolean).join(" ") || `room ${room}`;
+  return storey ? `${names}, ${storey}` : names;
+}
+
 /** What a target is called, with a capital letter. */
 export function describe(bake, kind, id) {
   if (kind === "cell") return `Cell ${cellName(bake, id)}`;

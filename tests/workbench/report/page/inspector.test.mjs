@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import { classesOf, keptWords, pathOf, reached } from "../../../../workbench/report/page/inspector.mjs";
+import { classesOf, keptWords, numbersFrom, pathOf, reached, roomFacts } from "../../../../workbench/report/page/inspector.mjs";
 import { chosen } from "./two_storeys.mjs";
 
 test("classes of targets are counted apart", () => {
@@ -54,4 +54,29 @@ test("a sightline's path goes through each portal to the cell behind it", () => 
   assert.deepEqual(pathOf(bake, 0, [0, 1]), there);
   assert.deepEqual(pathOf(bake, 2, [1, 0]), back);
   assert.deepEqual(pathOf(bake, 0, []), []);
+});
+
+test("a room in words and numbers: of all its view cells together", () => {
+  const state = chosen();
+  state.pickRoom(1);
+  const every = () => true;
+  assert.equal(roomFacts(state.bake, 1), "2 view cells (2, 3) together; they hold 96 % of where eyes may be in it");
+  const guid = "0BTBFw6f90Nfh9rP1dlXrr";
+  const facts = `1 view cell (0) together; it holds 100 % of where eyes may be in it; storey at -0.50 m by the file; ${guid}`;
+  assert.equal(roomFacts(state.bake, 0), facts);
+  assert.deepEqual(numbersFrom(state, "cell", every), { potential: 4, seen: 4, unknown: 0, over: 1 });
+  assert.deepEqual(numbersFrom(state, "object", every), { potential: 1, seen: 1, unknown: 0, over: 1 });
+  assert.deepEqual(reached(state), [
+    [0, 0, 2],
+    [0, 0, 1],
+  ]);
+  const many = chosen((data) => {
+    data.rooms.starts.set([0, 1, 18, 18]);
+    data.rooms.cells = new Uint8Array(18).fill(2);
+  });
+  assert.match(roomFacts(many.bake, 1), /^17 view cells \((2, ){16}\.\.\.\) together/);
+  const beside = chosen((data) => {
+    data.cells.firstPlan = 3;
+  });
+  assert.match(roomFacts(beside.bake, 1), /nothing is claimed of the cells that these see$/);
 });

@@ -11,6 +11,12 @@ test("targets are listed by verdict, without the view cell itself", () => {
   assert.deepEqual(list.targetsByVerdict(state, "object"), [[1, 3], [2], [0]]);
 });
 
+test("of a room's targets its own view cells are left out", () => {
+  const state = chosen();
+  state.pickRoom(1);
+  assert.deepEqual(list.targetsByVerdict(state, "cell"), [[], [], [0, 1]]);
+});
+
 test("large targets come first, inhabitable cells before them all", () => {
   const state = chosen((data) => data.cells.boxes.set([0, 0, 0, 999, 999, 999], 6));
   assert.deepEqual(list.bySize(state.bake, "cell", [0, 1, 2, 3]), [0, 3, 2, 1]);

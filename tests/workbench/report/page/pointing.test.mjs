@@ -46,6 +46,10 @@ test("the tip says what is under the pointer", () => {
   assert.equal(tipWords(state, { kind: "object", id: 1 }, []), "Object 1\nHIDDEN from view cell 0");
   assert.equal(tipWords(state, null, [0]), "The view cell, 0 (hall)");
   assert.equal(tipWords(state, null, []), "");
+  state.pickRoom(1);
+  assert.equal(tipWords(state, { kind: "object", id: 1 }, []), "Object 1\nSEEN from room suite, Upper");
+  assert.equal(tipWords(state, null, [2]), "A view cell of the room, 2 (Room 7)");
+  state.pick(0);
   const above = "2 view cells above each other: click again for the next";
   assert.equal(tipWords(state, null, [2, 3]), above);
   assert.equal(tipWords(state, null, [0, 3]), `The view cell, 0 (hall)\n${above}`);

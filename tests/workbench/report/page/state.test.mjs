@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import { HIDDEN, SEEN, UNKNOWN } from "../../../../workbench/report/page/data.mjs";
+import { HIDDEN, SEEN, UNCLAIMED, UNKNOWN } from "../../../../workbench/report/page/data.mjs";
 import { LISTED } from "../../../../workbench/report/page/state.mjs";
 import { chosen } from "./two_storeys.mjs";
 
@@ -75,4 +75,44 @@ test("zoom is about the view cell in sight, else about the middle", () => {
   assert.deepEqual([state.view.x, state.view.y, state.view.scale], [31, 20, 4]);
   state.fit();
   assert.deepEqual([state.view.x, state.view.y], [42, 20]);
+});
+
+test("a room is looked from by all its view cells: what one of them sees is seen", () => {
+  const state = chosen((data) => {
+    data.objectRows.starts.set([0, 2, 2, 3, 5]);
+    data.objectRows.gaps = Uint8Array.of(0, 2, 1, 0, 1);
+    data.objectRows.codes = Uint8Array.of(2, 0, 2, 0, 0);
+  });
+  state.pickRoom(1);
+  assert.deepEqual([state.room, state.cell, state.from, state.storey], [1, 2, [2, 3], 0]);
+  // Cell 2 sees cells 0, 1, 2 and object 1; cell 3 itself, and perhaps objects 0 and 1.
+  assert.deepEqual([...state.verdicts.cell], [SEEN, SEEN, SEEN, SEEN]);
+  assert.deepEqual([...state.verdicts.object], [UNKNOWN, SEEN, HIDDEN, HIDDEN]);
+  // The page has a sightline from cell 2 alone.
+  assert.equal(state.seenFrom({ kind: "cell", id: 1 }), 2);
+  assert.deepEqual(state.sightline({ kind: "cell", id: 1 }).portals, [1]);
+  assert.equal(state.sightline({ kind: "object", id: 0 }), null);
+  state.pick(0);
+  assert.deepEqual([state.room, state.from], [-1, [0]]);
+});
+
+test("a room without view cells cannot be picked", () => {
+  const state = chosen();
+  state.on("cell room", () => assert.fail("picked"));
+  state.pickRoom(2);
+  assert.equal(state.room, -1);
+});
+
+test("of cells that only view cells at an angle might see nothing is claimed", () => {
+  const state = chosen((data) => {
+    data.cells.firstPlan = 3;
+    data.cells.plans = Int32Array.of(0, 0, 40, 0, 40, 40, 0, 40);
+    data.cellRows.starts.set([0, 3, 3, 6, 6]);
+    data.cellRows.gaps = Int8Array.of(0, 1, 1, 1, 1, 0);
+    data.cellRows.codes = Uint8Array.of(1, 1, 0, 0, 1, 1);
+    data.cellRows.starts.set([0, 3, 3, 5, 5]);
+  });
+  state.pickRoom(1);
+  // Cell 2 hides cell 0, of which the other says nothing; both see themselves.
+  assert.deepEqual([...state.verdicts.cell], [UNCLAIMED, UNKNOWN, SEEN, SEEN]);
 });

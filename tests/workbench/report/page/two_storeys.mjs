@@ -42,9 +42,19 @@ export function handmade() {
     objects: {
       boxes: Int32Array.from(OBJECTS.flat()),
       names: ["wall", "", "pane", ""],
+      guids: ["2O2Fr$t4X7Zf8NOew3FLKr", "", "0BTBFw6f90Nfh9rP1dlXr2", ""],
       kinds: ["IfcDesk", "IfcWall"],
       kind: Uint8Array.of(1, 0, 0, 0),
       role: Uint8Array.of(0, 1, 2, 0),
+    },
+    rooms: {
+      words: [
+        { name: "1", longName: "Hall", guid: "0BTBFw6f90Nfh9rP1dlXrr", storey: "Ground", elevation: -0.5, covered: 1 },
+        { name: "suite", longName: "", guid: "", storey: "Upper", elevation: null, covered: 0.955 },
+        { name: "void", longName: "void", guid: "", storey: "", elevation: null, covered: 0 },
+      ],
+      starts: Uint8Array.of(0, 1, 3, 3),
+      cells: Uint8Array.of(0, 2, 3),
     },
     storeys: [
       { floor: 0, level: 12.5, step: 8 },
