@@ -155,6 +155,11 @@ class Scene:
     skipped: list[dict[str, str]] = field(default_factory=list)
     notes: list[dict[str, str]] = field(default_factory=list)
 
+    def __repr__(self) -> str:
+        """What it is of and how large, on a line."""
+        rooms = f", {len(self.spaces):,} rooms" if self.spaces else ""
+        return f"<Scene {self.source!r}: {len(self.objects):,} objects{rooms}>"
+
     @property
     def lost_rooms(self) -> list[str]:
         """Rooms that the model names but gives no body, as listed in `skipped`."""

@@ -203,31 +203,6 @@ class BakeFolder:
         table = self.cell_to_object
         return kept_shares(self.graph.cell_count, *(table[name].to_numpy() for name in CELL_TO_OBJECT[:2]), sizes)
 
-    def potential(self, cell: int) -> np.ndarray:
-        """Ids of the objects that may be visible from somewhere in a cell, ascending: its PVS.
-
-        Raises:
-            InputError: the cell does not exist or is not inhabitable.
-        """
-        return self._objects_of(cell, None)
-
-    def seen(self, cell: int) -> np.ndarray:
-        """Ids of the objects that a stored witness shows to be visible from the cell, ascending.
-
-        Raises:
-            InputError: the cell does not exist or is not inhabitable.
-        """
-        return self._objects_of(cell, Verdict.VISIBLE)
-
-    def _objects_of(self, cell: int, verdict: Verdict | None) -> np.ndarray:
-        if not (0 <= cell < self.graph.cell_count and self.graph.inhabitable[cell]):
-            raise InputError(f"cell: expected the id of an inhabitable cell, found {cell}")
-        table = self.cell_to_object
-        rows = table["cell_id"].to_numpy() == cell
-        if verdict is not None:
-            rows &= np.array(table["verdict"].to_pylist(), object) == verdict.word
-        return np.sort(table["object_id"].to_numpy()[rows])
-
     def _matrix(self, table: pa.Table, target: str, targets: int) -> np.ndarray:
         out = np.zeros((self.graph.cell_count, targets), bool)
         out[table["cell_id"].to_numpy(), table[target].to_numpy()] = True
