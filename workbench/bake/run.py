@@ -4,7 +4,7 @@ import shutil
 import time
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 import pyarrow as pa
@@ -28,7 +28,7 @@ from .blocks import Shortfall, Store, Work, in_blocks, partial_folder, refine
 from .cells import Sources, bare_sources, model_sources
 from .manifest import Clock, bake_manifest, fingerprint, rewrite_manifest
 from .place import check_place, occupied, set_aside
-from .settings import LevelSettings, Settings, check_number
+from .settings import LevelSettings, Settings, SettingsWords, check_number, with_words
 from .worth import worth
 
 if TYPE_CHECKING:
@@ -68,13 +68,14 @@ def bake(
     overwrite: bool = False,
     progress: bool = False,
     tuned: dict[str, dict] | None = None,
+    **words: Unpack[SettingsWords],
 ) -> Bake:
     """Cut a model into cells and portals and compute what each inhabitable cell can see.
 
     Args:
         model: a scene, a model file, a scene folder, or a folder with only cells.parquet and portals.parquet.
         out: bake folder to write; by default `<model>.bake` in the current folder.
-        settings: what the answer depends on.
+        settings: what the answer depends on; the default ones if there are none.
         budget_s: stop after so many seconds of visibility, preparing for it included; what is left is unknown, never
             hidden, and baking again goes on from there.
         threads: CPU threads; all cores by default. The answer does not depend on it.
@@ -83,6 +84,7 @@ def bake(
             is, and any other is left alone. Files of others in that folder stay either way.
         progress: show a progress bar.
         tuned: what `viewcell tune` has found for those who walk through the bake, by name; stored in the manifest.
+        words: settings by name, such as `doors="closed"`, in place of those in `settings`.
 
     Returns:
         The bake. Absent rows are hidden, exactly; `unknown` rows are kept.
@@ -91,7 +93,7 @@ def bake(
         InputError: the model, the settings or the place to write are unusable, or another bake is there; nothing is
             written or lost.
     """
-    settings = settings or Settings()
+    settings = with_words(settings, words)
     settings.check()
     check_number("budget", 1.0 if budget_s is None else budget_s, 1e-9)
     check_number("threads", 1 if threads is None else threads, 1)

@@ -1,8 +1,9 @@
 """What a bake's answer depends on, in groups by what they speak of."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
@@ -178,6 +179,53 @@ class Settings(LevelSettings, MethodSettings, CellSettings, ModelSettings):
         if 0.0 < self.refine_kept < 1.0:
             raise InputError(f"refine-kept: expected 0 or a ratio from 1, found {self.refine_kept:g}")
         _ = self.frame, self.pixel_limit, self.vlod
+
+
+class SettingsWords(TypedDict, total=False):
+    """Settings as keywords, each as in its group."""
+
+    doors: str
+    glass: str
+    doors_by: str
+    leave_out: str
+    yaw: str | float
+    seal: float
+    split: bool
+    cells: str | Path
+    threshold_m2: float
+    cell_size_m: float
+    depth: int
+    refine_triangles: int
+    refine_gap: float
+    largest_cell: float
+    refine_kept: float
+    method: str
+    certify: bool
+    seed: int
+    clusters: int
+    objective: str
+    resolution: int
+    lods: bool
+    pixels: float
+    image: str
+    fov_deg: float
+
+
+def with_words(settings: Settings | None, words: SettingsWords) -> Settings:
+    """Settings, the default ones unless some are given, changed by keywords.
+
+    Raises:
+        InputError: a keyword is no setting.
+    """
+    known = [field.name for field in fields(Settings)]
+    for name in words:
+        if name not in known:
+            close = get_close_matches(name, known, 1)
+            hint = f": {close[0]} is one" if close else f" ({', '.join(known)})"
+            raise InputError(f"settings: expected the name of a setting, found {name!r}{hint}")
+    # Paths and degrees are written as on the command line.
+    told = {name: str(value) if name in ("cells", "yaw") else value for name, value in words.items()}
+    return replace(settings or Settings(), **told)
 
 
 def check_number(name: str, value: float, least: float) -> None:
