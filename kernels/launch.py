@@ -178,7 +178,8 @@ def run_sliced(
     """
     if count == 0:
         return
-    module.load(wp.get_device(device.name))
+    # As a launch does: Module.load alone compiles a second variant on a CPU, for blocks of many threads.
+    wp.load_module(module, device=device.name)
 
     def slotted(slots: int) -> tuple[object, ...]:
         return () if scratch is None else (slots, *scratch.arrays(slots, device))

@@ -88,3 +88,10 @@ def test_every_row_is_launched_once(count, device):
     launch = lambda first, last: rows.extend(range(first, last))  # noqa: E731
     run_sliced(launch, count, wp.get_module("viewcell.kernels.launch"), device, chunk=4, gpu_chunk=4)
     assert sorted(rows) == list(range(count))
+
+
+def test_a_launch_compiles_one_variant():
+    """Warp's own loading of a module takes blocks of many threads, which no launch on a CPU has."""
+    LAUNCHERS["backface"](np.array([[[-9, -8, -7], [-1, -2, -3]], [[1, 2, 3], [9, 8, 7]]]))
+    module = wp.get_module("viewcell.kernels.backface")
+    assert [block for context, block in module.execs if context == wp.get_device("cpu").context] == [1]
