@@ -19,11 +19,12 @@ run: install
 	$(BIN)/viewcell verify out/office
 	$(BIN)/viewcell report out/office
 
+# Stealing work leaves tests of a file in one process, so what they share is made once.
 test: install
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 test-slow: install
-	$(BIN)/python -m pytest -n auto -m slow
+	$(BIN)/python -m pytest -n auto --dist worksteal -m slow
 
 # ONLY=TEXT tries the faults whose name or file holds the text.
 mutants: install

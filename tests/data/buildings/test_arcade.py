@@ -62,6 +62,7 @@ def test_the_passage_is_an_octagon_on_the_floor(arcade):
     assert low[2] == 0.0 and high[1] - low[1] == pytest.approx(2.25)
 
 
+@pytest.mark.slow
 def test_plants_of_the_court_are_seen_through_the_arches(arcade, tmp_path):
     made = bake(arcade, tmp_path / "arcade", threads=1)
     assert made.manifest["yaw_deg"] == 0.0
