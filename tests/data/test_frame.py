@@ -189,7 +189,7 @@ def assert_baked_alike(plain_pairs, tmp_path, yaw_deg, **size):
     assert bake(scene, tmp_path / "turned", threads=1).manifest == made.manifest
 
 
-@pytest.mark.parametrize("yaw_deg", [5.0, 17.0, 30.0, 45.0])
+@pytest.mark.parametrize("yaw_deg", [17.0, 45.0])
 def test_a_turned_office_is_baked_as_one_on_the_axes(yaw_deg, plain_pairs, tmp_path):
     assert_baked_alike(plain_pairs, tmp_path, yaw_deg, floors=2, rooms_per_side=1)
 

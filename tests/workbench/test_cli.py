@@ -173,7 +173,7 @@ def test_interrupted_before_the_end_leaves_no_bake(office, tmp_path, monkeypatch
 
 def test_interrupted_bake_resumes_to_the_same_result(tmp_path):
     scene, out, whole = tmp_path / "o.scene", tmp_path / "o.bake", tmp_path / "whole.bake"
-    write_scene(viewcell.make_office(floors=3, rooms_per_side=6, furnished=False), scene)
+    write_scene(viewcell.make_office(floors=2, rooms_per_side=6, furnished=False), scene)
     write_graph(tmp_path / "rooms")
     assert main(["bake", str(tmp_path / "rooms"), "--out", str(out), "--no-progress"]) == 0
     old, arguments = hashes(out), ["bake", str(scene), "--overwrite", "--no-progress", "--out"]

@@ -84,7 +84,7 @@ def test_the_first_wing_is_the_office_itself():
     assert moved == 0 and len(joined.spaces) == 2 * len(alone.spaces) + 1
 
 
-@pytest.mark.parametrize("angle_deg", [30.0, -50.0])
+@pytest.mark.parametrize("angle_deg", [30.0, pytest.param(-50.0, marks=pytest.mark.slow)])
 def test_one_wing_is_seen_from_the_other(angle_deg, tmp_path):
     scene = make_office(floors=1, rooms_per_side=1, furnished=False, wings=2, wing_angle_deg=angle_deg)
     made = bake(scene, tmp_path / "wings", threads=1)

@@ -213,7 +213,7 @@ def test_what_is_no_face_is_listed(tmp_path):
 
 
 def test_unusable_drawings_are_one_line(tmp_path, monkeypatch):
-    monkeypatch.setattr("viewcell.data.readers.dxf.POLYGONS", 100_000)
+    monkeypatch.setattr("viewcell.data.readers.dxf.POLYGONS", 10_000)
 
     def many(drawing):
         drawing.blocks.new("leaf").add_3dface(SQUARE)

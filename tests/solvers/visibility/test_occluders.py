@@ -31,6 +31,11 @@ def office():
 
 
 @pytest.fixture(scope="module")
+def small_office():
+    return make_office(floors=1, rooms_per_side=1)
+
+
+@pytest.fixture(scope="module")
 def cells(tmp_path_factory):
     return write_cells(tmp_path_factory.mktemp("cells") / "cells.csv")
 
@@ -109,13 +114,13 @@ def test_answers_do_not_depend_on_threads(office, cells, by_occluders, tmp_path)
     assert two.cell_to_object.equals(by_occluders.cell_to_object)
 
 
-def test_octree_refines_where_much_is_unknown_or_seen(office, tmp_path):
+def test_octree_refines_where_much_is_unknown_or_seen(small_office, tmp_path):
     def made(**settings):
         settings = Settings(method="occluders", cell_size_m=6.0, **settings)
-        return bake(office, tmp_path / "tree.bake", settings=settings, overwrite=True)
+        return bake(small_office, tmp_path / "tree.bake", settings=settings, overwrite=True)
 
     coarse = made(depth=0)
-    triangles = office.triangle_counts
+    triangles = small_office.triangle_counts
     load_of = coarse.potential_objects @ triangles
     some = made(depth=1, refine_triangles=int(np.median(load_of)), refine_gap=1.0)
     assert coarse.graph.cell_count < some.graph.cell_count
@@ -127,14 +132,14 @@ def test_octree_refines_where_much_is_unknown_or_seen(office, tmp_path):
     assert (load_of[kept] <= np.median(load_of)).all()
 
 
-def test_an_octree_under_a_budget_keeps_what_it_did_not_reach(office, tmp_path):
+def test_an_octree_under_a_budget_keeps_what_it_did_not_reach(small_office, tmp_path):
     settings = Settings(method="occluders", cell_size_m=8.0, depth=1, refine_triangles=1)
-    made = bake(office, tmp_path / "tree.bake", settings=settings, budget_s=1e-6)
+    made = bake(small_office, tmp_path / "tree.bake", settings=settings, budget_s=1e-6)
     assert made.manifest["budget_spent"] and made.potential_objects.all()
-    bake(office, tmp_path / "tree.bake", settings=settings, budget_s=0.4)
-    again = bake(office, tmp_path / "tree.bake", settings=settings)
+    bake(small_office, tmp_path / "tree.bake", settings=settings, budget_s=0.4)
+    again = bake(small_office, tmp_path / "tree.bake", settings=settings)
     assert not again.manifest["budget_spent"] and not again.potential_objects.all()
-    whole = bake(office, tmp_path / "whole.bake", settings=settings)
+    whole = bake(small_office, tmp_path / "whole.bake", settings=settings)
     assert again.cell_to_object.equals(whole.cell_to_object)
 
 

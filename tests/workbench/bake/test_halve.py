@@ -87,7 +87,7 @@ def test_halves_meet_in_the_middle():
 @pytest.mark.parametrize("certify", [False, True])
 def test_a_refined_bake_keeps_less_and_is_as_true(certify, tmp_path):
     """Halves are called as their cell, see each other through the faces between them, and hide nothing that is seen."""
-    office = viewcell.make_office(floors=1, rooms_per_side=4)
+    office = viewcell.make_office(floors=1, rooms_per_side=2)
     plain, refined = (
         viewcell.bake(office, tmp_path / f"{ratio}", settings=Settings(certify=certify, refine_kept=ratio))
         for ratio in (0.0, 1.5)

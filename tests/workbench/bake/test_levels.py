@@ -20,7 +20,7 @@ from viewcell.workbench.cli import main
 @pytest.fixture(scope="module")
 def office():
     """A small office whose furniture has one level."""
-    scene = make_office(floors=1, rooms_per_side=3)
+    scene = make_office(floors=1, rooms_per_side=2)
     return replace(scene, definitions=[Definition(shape.name, shape.lods[:1]) for shape in scene.definitions])
 
 

@@ -423,16 +423,18 @@ def test_assert_conservative_fails_usefully(house, claims):
 
 def test_plugin(tmp_path, house, claims):
     write_inputs(tmp_path, house, claims)
+    pyarrow.csv.write_csv(without(claims[0], 2), tmp_path / "cut.csv")
     (tmp_path / "pytest.ini").write_text("[pytest]\nviewcell_model = house.scene\n")
     (tmp_path / "test_mine.py").write_text(
-        "def test_pvs(scene, assert_conservative):\n"
-        f"    assert_conservative('pvs.csv', scene, cells='cells.parquet', rays={RAYS})\n"
+        "import pytest\n\n"
+        "@pytest.mark.parametrize('sets', ['pvs.csv', 'cut.csv'])\n"
+        "def test_pvs(scene, assert_conservative, sets):\n"
+        f"    assert_conservative(sets, scene, cells='cells.parquet', rays={RAYS})\n"
     )
-    for table, code in ((claims[0], 0), (without(claims[0], 2), 1)):
-        pyarrow.csv.write_csv(table, tmp_path / "pvs.csv")
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert done.returncode == code, done.stdout + done.stderr
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and "1 failed, 1 passed" in done.stdout, done.stdout + done.stderr
+    assert "FAILED test_mine.py::test_pvs[cut.csv]" in done.stdout
     assert "not conservative: 1 visible pair claimed hidden" in done.stdout and "sees object" in done.stdout
 
 

@@ -31,6 +31,7 @@ def quick(monkeypatch):
         monkeypatch.setattr(sweeps, name, values)
 
 
+@pytest.mark.slow
 def test_every_knob_of_a_model_is_swept(baked, quick, tmp_path, capsys):
     assert main(["curves", str(baked), "--cells", "2", "--out", str(tmp_path), "--no-progress"]) == 0
     said = capsys.readouterr().out
@@ -66,6 +67,7 @@ def test_a_bare_graph_is_swept_by_portals_and_rays(graph, quick, tmp_path):
     assert many.wrong_hidden < few.wrong_hidden < 14
 
 
+@pytest.mark.slow
 def test_a_method_that_hides_what_is_seen_fails(baked, quick, tmp_path, monkeypatch):
     honest = sweeps.bake
 
