@@ -15,7 +15,6 @@ pytestmark = pytest.mark.skipif(not SCENES.is_dir(), reason="no shared scenes fo
 IFC = {  # objects, spaces, openings, some roles
     "threerooms_sb": (29, 4, 11, {"IfcWall": "occluder", "IfcFurniture": "detail", "IfcDoor": "transparent"}),
     "kit_edc_sb": (264, 58, 143, {"IfcSlabStandardCase": "occluder", "IfcDoorStandardCase": "transparent"}),
-    "xbim_house_invalid": (134, 13, 45, {"IfcSlab": "occluder", "IfcWindow": "transparent"}),
 }
 IFC_SLOW = {
     "ac11_institute_var2": (700, 82, 287, {"IfcFurnishingElement": "detail"}),
@@ -24,6 +23,7 @@ IFC_SLOW = {
     "allplan_smiley_west": (396, 70, 140, {"IfcSlab": "occluder"}),
     "duplex_A": (215, 21, 50, {"IfcStairFlight": "occluder", "IfcCovering": "occluder"}),
     "jesse_nospaces": (626, 0, 149, {"IfcPlate": "transparent", "IfcMember": "occluder"}),
+    "xbim_house_invalid": (134, 13, 45, {"IfcSlab": "occluder", "IfcWindow": "transparent"}),
     "office_A": (803, 99, 181, {"IfcFlowTerminal": "detail", "IfcCovering": "occluder"}),
 }
 MESHES = {
