@@ -17,6 +17,7 @@ from .occludees import Occludees, find_occludees
 from .opaque import NO_PLANES, OpaquePlanes, opaque_planes
 from .patches import Patches, find_patches, join_outlines, rectangle_outlines
 from .regions import Regions, find_regions
+from .room_cells import find_room_points
 from .scene import OPAQUE, Role, Scene
 from .skewed import find_sections, with_sections
 from .solids import closed_elements
@@ -48,6 +49,11 @@ class PreparedModel:
     def closed(self) -> list[tuple[int, np.ndarray]]:
         """(object_id, triangles (m, 3, 3) int32) of each closed opaque element."""
         return closed_elements(self.scene)
+
+    @cached_property
+    def room_points(self) -> list[np.ndarray]:
+        """Points of each room where eyes may be [grid steps], each of shape (n, 3), float64."""
+        return find_room_points(self.scene, self.closed)
 
     @cached_property
     def large_closed(self) -> list[np.ndarray]:

@@ -37,6 +37,8 @@ ENOUGH = 0.98
 REACHED = 1e-3
 # Winding numbers of closed bodies are so near to whole ones.
 WHOLE = 1e-3
+# A point is under an edge of a face if its share of the opposite corner is less than this.
+ON_EDGE = 1e-9
 # Directions of a room's walls within this angle are one.
 SNAPPED_DEG = 0.1
 
@@ -71,18 +73,16 @@ def room_name(space: Space) -> str:
     return space.name or "room"
 
 
-def add_room_cells(
-    scene: Scene, graph: CellGraph, solids: list[tuple[int, np.ndarray]]
-) -> tuple[CellGraph, list[RoomCover]]:
+def add_room_cells(scene: Scene, graph: CellGraph, room_points: list[np.ndarray]) -> tuple[CellGraph, list[RoomCover]]:
     """The graph with view cells for rooms that its own cells do not cover, and how all rooms are covered then.
 
     Args:
         scene: the model.
         graph: with inhabitable cells and their names.
-        solids: closed elements, in which nobody stands.
+        room_points: of each room, as of `find_room_points`.
     """
     covers, prisms, names = [], [], []
-    for space, points in zip(scene.spaces, room_points(scene, solids), strict=True):
+    for space, points in zip(scene.spaces, room_points, strict=True):
         share = _covered_share(space, points, graph)
         made: list[tuple[np.ndarray, np.ndarray]] = []
         if share < COVERED_SHARE and len(points):
@@ -95,9 +95,9 @@ def add_room_cells(
     return _with_cells(graph, prisms, names), covers
 
 
-def room_covers(scene: Scene, graph: CellGraph, solids: list[tuple[int, np.ndarray]]) -> list[RoomCover]:
+def room_covers(scene: Scene, graph: CellGraph, room_points: list[np.ndarray]) -> list[RoomCover]:
     """How the rooms of a model are covered by the inhabitable cells of a graph that are named after them."""
-    points = zip(scene.spaces, room_points(scene, solids), strict=True)
+    points = zip(scene.spaces, room_points, strict=True)
     return [_cover(space, own, _covered_share(space, own, graph)) for space, own in points]
 
 
@@ -114,7 +114,7 @@ def _cover(space: Space, points: np.ndarray, share: float) -> RoomCover:
     return RoomCover(room_name(space), share, why)
 
 
-def room_points(scene: Scene, solids: list[tuple[int, np.ndarray]]) -> list[np.ndarray]:
+def find_room_points(scene: Scene, solids: list[tuple[int, np.ndarray]]) -> list[np.ndarray]:
     """`eye_points` of each room outside all solids [grid steps], each of shape (n, 3), float64."""
     points = [eye_points(space) / scene.grid_m for space in scene.spaces]
     around = [np.array([own.min(axis=0), own.max(axis=0)]) if len(own) else np.zeros((2, 3)) for own in points]
@@ -183,17 +183,17 @@ def eye_points(space: Space) -> np.ndarray:
 def in_room(space: Space, points: np.ndarray) -> np.ndarray:
     """Points [m], shape (n, 3), that are inside a room, shape (n,), bool.
 
-    By the winding number of its body; where that is no whole number the body is open, or turned inside out here and
-    there: then points are inside that have an odd number of its faces above and below them.
+    By the faces above a point, counted with their signs: the winding number of a closed body. Where the point is under
+    or over an edge, or those above and below do not add up to none, the solid angles of all faces tell. If they are no
+    whole number the body is open: then points are inside that have an odd number of faces above and below them.
     """
     corners = space.vertices[space.faces]
-    winding = winding_numbers(points, corners)
-    if np.abs(winding - np.round(winding)).max(initial=0.0) < WHOLE:
-        return np.abs(winding) > 0.5
     a, b, c = (corners[:, k] for k in range(3))
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     level = np.abs(area) > 1e-9
-    above, below = np.zeros(len(points), int), np.zeros(len(points), int)
+    # Faces above and below each point, with their signs and without.
+    above, below = np.zeros((2, len(points)), int), np.zeros((2, len(points)), int)
+    edged = np.zeros(len(points), bool)
     for p, q, r, size in zip(a[level], b[level], c[level], area[level], strict=True):
         near = np.flatnonzero(
             (points[:, :2] >= np.minimum(np.minimum(p, q), r)[:2]).all(axis=1)
@@ -201,11 +201,20 @@ def in_room(space: Space, points: np.ndarray) -> np.ndarray:
         )
         x, y = points[near, 0], points[near, 1]
         shares = [((v[0] - u[0]) * (y - u[1]) - (v[1] - u[1]) * (x - u[0])) / size for u, v in ((q, r), (r, p), (p, q))]
-        inside = (shares[0] > 0) & (shares[1] > 0) & (shares[2] > 0)
+        least = np.minimum(np.minimum(shares[0], shares[1]), shares[2])
+        inside = least > 0
+        edged[near[np.abs(least) < ON_EDGE]] = True
         height = shares[0] * p[2] + shares[1] * q[2] + shares[2] * r[2]
-        above[near[inside & (height > points[near, 2])]] += 1
-        below[near[inside & (height <= points[near, 2])]] += 1
-    return (above % 2 == 1) & (below % 2 == 1)
+        sign = 1 if size > 0 else -1
+        for count, held in ((above, height > points[near, 2]), (below, height <= points[near, 2])):
+            count[:, near[inside & held]] += np.array([[sign], [1]])
+    held = above[0] != 0
+    doubtful = np.flatnonzero(edged | (above[0] + below[0] != 0))
+    winding = winding_numbers(points[doubtful], corners)
+    if np.abs(winding - np.round(winding)).max(initial=0.0) < WHOLE:
+        held[doubtful] = np.abs(winding) > 0.5
+        return held
+    return (above[1] % 2 == 1) & (below[1] % 2 == 1)
 
 
 def room_prisms(space: Space, grid_m: float) -> list[tuple[np.ndarray, np.ndarray]]:

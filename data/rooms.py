@@ -11,7 +11,7 @@ import numpy as np
 from .graph import CellGraph
 from .plans import box_corners
 from .ragged import places_of, starts_of
-from .room_cells import called_after, in_room, points_in_cell, room_points
+from .room_cells import called_after, in_room, points_in_cell
 from .rows import Rows
 from .scene import Scene, Space
 from .verdict import Verdict
@@ -48,7 +48,7 @@ class RoomCells:
 
 
 def join_rooms(
-    scene: Scene, graph: CellGraph, solids: list[tuple[int, np.ndarray]], *, named: bool = True, claims: bool = True
+    scene: Scene, graph: CellGraph, room_points: list[np.ndarray], *, named: bool = True, claims: bool = True
 ) -> RoomCells:
     """The inhabitable cells of each room of a model: those that hold a point of it.
 
@@ -57,12 +57,12 @@ def join_rooms(
     Args:
         scene: the model.
         graph: its cells.
-        solids: closed elements, in which nobody stands.
+        room_points: of each room, as of `find_room_points`.
         named: whether cells are called after their rooms: only such a cell is then the room's.
         claims: whether the bake says what cells see of each other.
     """
     found, covered = [], []
-    for space, points in zip(scene.spaces, room_points(scene, solids), strict=True):
+    for space, points in zip(scene.spaces, room_points, strict=True):
         low, high = (pick(space.vertices / scene.grid_m, axis=0) for pick in (np.min, np.max))
         near = graph.inhabitable & (graph.cells[:, 0] <= high).all(axis=1) & (graph.cells[:, 1] >= low).all(axis=1)
         cells = [cell for cell in np.flatnonzero(near) if not named or called_after(graph.cell_names[cell], space)]

@@ -27,7 +27,7 @@ def test_rooms_oblique_to_the_cells_have_cells_of_their_own(case):
     graph = model_sources(model, Settings(), Clock()).graph
     named = graph.inhabitable & (graph.cell_names != "")
     assert {room for name in graph.cell_names[named] for room in name.split(", ")} == {"east", "west"}
-    assert all(room.covered for room in room_covers(model.scene, graph, model.closed))
+    assert all(room.covered for room in room_covers(model.scene, graph, model.room_points))
 
 
 def test_rooms_without_a_body_are_found_by_flooding():

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 import trimesh
 from viewcell.data.graph import CellGraph
-from viewcell.data.room_cells import COVERED_SHARE, RASTER_M, add_room_cells, eye_points, in_room, room_prisms
+from viewcell.data.room_cells import (
+    COVERED_SHARE,
+    RASTER_M,
+    add_room_cells,
+    eye_points,
+    find_room_points,
+    in_room,
+    room_prisms,
+)
 from viewcell.data.scene import GRID_M, Scene, Space
 
 L_SHAPE = [[0, 0], [6, 0], [6, 3], [3, 3], [3, 5], [0, 5]]
@@ -40,6 +48,11 @@ ROOMS = {
 }
 
 
+def with_room_cells(scene, graph):
+    """As `add_room_cells`, without solids."""
+    return add_room_cells(scene, graph, find_room_points(scene, []))
+
+
 def no_cells():
     none = np.zeros((0, 2), np.int32)
     return CellGraph(np.zeros((0, 2, 3), np.int32), np.zeros(0, bool), np.zeros(0, object), none,
@@ -48,7 +61,7 @@ def no_cells():
 
 def covered(space):
     """The graph with the room's own cells, and how it is covered."""
-    graph, (cover,) = add_room_cells(Scene([], [], [space]), no_cells(), [])
+    graph, (cover,) = with_room_cells(Scene([], [], [space]), no_cells())
     return graph, cover
 
 
@@ -146,8 +159,8 @@ def test_a_room_that_its_cells_cover_gets_no_others():
     graph = no_cells()
     graph = CellGraph(cells, np.ones(1, bool), np.array(["hall"], object), graph.portal_cells, graph.portal_axis,
                       graph.portals)  # fmt: skip
-    again, (cover,) = add_room_cells(Scene([], [], [space]), graph, [])
+    again, (cover,) = with_room_cells(Scene([], [], [space]), graph)
     assert cover.share == 1 and again.cell_count == 1
     named = CellGraph(cells, np.ones(1, bool), np.array(["other"], object), graph.portal_cells, graph.portal_axis,
                       graph.portals)  # fmt: skip
-    assert add_room_cells(Scene([], [], [space]), named, [])[0].cell_count > 1
+    assert with_room_cells(Scene([], [], [space]), named)[0].cell_count > 1

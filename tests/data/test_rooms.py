@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.graph import CellGraph
 from viewcell.data.plans import NO_PLANS, Plans
+from viewcell.data.room_cells import find_room_points
 from viewcell.data.rooms import RoomCells, join_rooms, rooms_from_rooms, seen_from_rooms
 from viewcell.data.rows import Rows
 from viewcell.data.scene import GRID_M, Scene, Space
@@ -35,6 +36,11 @@ def graph_of(boxes, names, inhabitable=True, plans=NO_PLANS):
     return CellGraph(cells.astype(np.int32), mask, np.array(names, object), none, *flat, plans)
 
 
+def rooms_of(scene, graph, **options):
+    """As `join_rooms`, without solids."""
+    return join_rooms(scene, graph, find_room_points(scene, []), **options)
+
+
 def cells_by_room(rooms):
     return [rooms.of(number).tolist() for number in range(rooms.count)]
 
@@ -58,7 +64,7 @@ NAMES = ["Flur", "Flur", "A, B", "A, B", "Flur, A, B", "Flur"]
 def test_cells_belong_to_the_rooms_that_they_are_called_after_and_hold_a_part_of():
     """Two rooms of one name, one above the other; a comma in a name; one cell in two rooms; one nobody stands in."""
     graph = graph_of(BOXES, NAMES, [True] * 5 + [False])
-    rooms = join_rooms(Scene([], [], [HALL, BELOW, OTHER, room("B", (0, 0, 0), (4, 3, 3))]), graph, [])
+    rooms = rooms_of(Scene([], [], [HALL, BELOW, OTHER, room("B", (0, 0, 0), (4, 3, 3))]), graph)
     # "B" is a part of the name "A, B" only by its letters: its place tells.
     assert cells_by_room(rooms) == [[0, 4], [1], [2, 3, 4], [4]]
     assert rooms.claims_rooms.all() and rooms.covered[:3].tolist() == [1, 1, 1] and 0.2 < rooms.covered[3] < 0.3
@@ -66,18 +72,18 @@ def test_cells_belong_to_the_rooms_that_they_are_called_after_and_hold_a_part_of
 
 def test_cells_without_rooms_in_their_names_belong_by_their_place():
     graph = graph_of([*BOXES, [[9, 0, 0], [12, 3, 3]]], ["x"] * 7)
-    rooms = join_rooms(Scene([], [], [HALL, OTHER]), graph, [], named=False, claims=False)
+    rooms = rooms_of(Scene([], [], [HALL, OTHER]), graph, named=False, claims=False)
     assert cells_by_room(rooms) == [[0, 4, 5], [2, 3, 4]] and not rooms.claims_rooms.any()
     # A room's own corner is enough, and a sliver of a cell that holds none of the cell's own samples.
     graph = graph_of([[[3.8, 2.8, 0], [40, 30, 3]]], [""])
-    assert cells_by_room(join_rooms(Scene([], [], [HALL]), graph, [], named=False)) == [[0]]
+    assert cells_by_room(rooms_of(Scene([], [], [HALL]), graph, named=False)) == [[0]]
 
 
 def test_a_room_with_a_cell_at_an_angle_claims_nothing_of_rooms():
     diamond = np.array([[[2, 0], [4, 1.5], [2, 3], [0, 1.5]]]) * METRE
     plans = Plans(np.array([1]), diamond.astype(np.int32))
     graph = graph_of([[[0, 0, -3], [4, 3, 0]], [[0, 0, 0], [4, 3, 3]]], ["Flur", "Flur"], plans=plans)
-    rooms = join_rooms(Scene([], [], [HALL, BELOW, OTHER]), graph, [])
+    rooms = rooms_of(Scene([], [], [HALL, BELOW, OTHER]), graph)
     assert cells_by_room(rooms) == [[1], [0], []] and rooms.claims_rooms.tolist() == [False, True, False]
     # A diamond is half of its box.
     assert rooms.covered[0] == pytest.approx(0.5, abs=0.03) and rooms.covered[2] == 0

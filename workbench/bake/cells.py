@@ -141,7 +141,7 @@ def _with_rooms(model: PreparedModel, graph: CellGraph) -> tuple[CellGraph, dict
     if bare:
         # No cell along the axes lies in a room. Rooms have view cells of their own; only without any is it guessed.
         graph.inhabitable = np.zeros(graph.cell_count, bool)
-    graph, covers = add_room_cells(model.scene, graph, model.closed)
+    graph, covers = add_room_cells(model.scene, graph, model.room_points)
     notes = {"rooms": [cover.entry for cover in covers]}
     if bare and graph.inhabitable.any():
         notes["inhabitable_because"] = f"inside the model's {len(spaces)} rooms"

@@ -190,7 +190,7 @@ def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dic
 
     if scene is not None and scene.spaces:
         of_cells = {"named": not sources.view_cells, "claims": cell_rows is not None}
-        rooms = join_rooms(scene, graph, sources.model.closed, **of_cells)
+        rooms = join_rooms(scene, graph, sources.model.room_points, **of_cells)
         extra |= room_tables(scene.spaces, rooms, (cell_rows, object_rows))
         clock.lap("rooms")
 

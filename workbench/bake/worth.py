@@ -95,7 +95,7 @@ def _uncovered_rooms(model: PreparedModel, graph: CellGraph, facts: dict) -> lis
     rooms = facts.get("rooms")
     # Whoever gives view cells knows where they are not.
     if rooms is None and facts.get("inhabitable_because") not in ("given", "octree"):
-        rooms = [cover.entry for cover in room_covers(model.scene, graph, model.closed)]
+        rooms = [cover.entry for cover in room_covers(model.scene, graph, model.room_points)]
     return [room for room in rooms or [] if "why" in room]
 
 
