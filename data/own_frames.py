@@ -16,6 +16,7 @@ import numpy as np
 
 from .blockers import Blockers
 from .curtains import LEAST_M2, NEAR_DEG, THIN_M, UPRIGHT, cuts_inside, inside, largest_sections
+from .frame import LEAST_DEG
 from .graph import OTHER_AXES
 from .hierarchy import build_hierarchy
 from .occludees import Occludees, turned_occludees
@@ -55,7 +56,7 @@ class OwnFrame:
 
 
 def find_own_frames(scene: Scene, closed: list[np.ndarray], cells: np.ndarray, plans: Plans) -> list[OwnFrame]:
-    """Frames for view cells with a plan; cells whose plan is no rectangle get none.
+    """Frames for view cells with a plan; cells whose plan is no rectangle, or stands along the axes, get none.
 
     Args:
         scene: the model.
@@ -94,10 +95,13 @@ def _groups(scene: Scene, plans: Plans) -> list[tuple[float, np.ndarray, np.ndar
         # The area between a plan and the rectangle around it, over its outline.
         wide = np.prod(around[:, 1] - around[:, 0], axis=1) - _area(level)
         fits = wide <= FIT_STEPS * 2 * (around[:, 1] - around[:, 0]).sum(axis=1)
-        if fits[0]:
+        if not fits[0]:
+            continue
+        left[rows[fits]] = False
+        # Along the axes the model's own frame is as good.
+        if LEAST_DEG < own % 90.0 < 90.0 - LEAST_DEG:
             boxes = np.stack([np.floor(around[:, 0] - DOUBT), np.ceil(around[:, 1] + DOUBT)], axis=1)
             groups.append((float(own), rows[fits], boxes[fits].astype(np.int64)))
-            left[rows[fits]] = False
     return groups
 
 

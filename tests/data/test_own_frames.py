@@ -123,6 +123,13 @@ def test_each_direction_has_its_frame():
     assert {round(f.yaw_deg, 1): sorted(f.cells.tolist()) for f in found} == {40.0: [0], 10.0: [1, 3]}
 
 
+def test_plans_along_the_axes_need_none():
+    scene = walls_at(17.0, seed=0)
+    along = np.array([[0, 0], [3000, 0], [3000, 2000], [0, 2000]])
+    (frame,) = find_own_frames(scene, [], *as_cells([along, plan(17.0, (1, 1), (3, 2))]))
+    assert frame.cells.tolist() == [1]
+
+
 def test_without_plans_there_are_no_frames():
     scene = walls_at(17.0, seed=0)
     assert find_own_frames(scene, [], np.zeros((1, 2, 3), np.int32), NO_PLANS) == []
