@@ -83,8 +83,6 @@ class Device:
 
 
 CPU = Device()
-# Warp greets whoever starts it, unless told not to before.
-wp.config.log_level = wp.LOG_WARNING
 
 
 def node_columns(hierarchy: Hierarchy) -> dict[str, np.ndarray]:

@@ -94,7 +94,7 @@ def _cells(text: str) -> list[int]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="viewcell", description="From-region visibility for buildings, with a proof on both sides.")
-    parser.add_argument("--version", action="version", version=f"viewcell {__version__}")
+    parser.add_argument("-V", "--version", action="version", version=f"viewcell {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_make(commands)
     _add_inspect(commands)
@@ -126,7 +126,7 @@ def _add_make(commands: argparse._SubParsersAction) -> None:
     buildings = make.add_subparsers(title="buildings", metavar="BUILDING", required=True)
     office = _command(buildings, "office", "make_office", "Make an office building and print its polygons by level.")
     office.add_argument(
-        "--out", default="office.scene", help="X.scene (ready to bake) or X.glb; office.scene by default"
+        "-o", "--out", default="office.scene", help="X.scene (ready to bake) or X.glb; office.scene by default"
     )
     office.add_argument("--floors", type=_whole(1), help="storeys, 1 to 100; 3 by default")
     office.add_argument("--rooms-per-side", type=_whole(1), help="offices on each side of the corridor; 8 by default")
@@ -155,7 +155,7 @@ def _add_make(commands: argparse._SubParsersAction) -> None:
         other = _command(buildings, name, "make_other", f"Make {text} and print its size.")
         other.set_defaults(building=name, counts=list(counts))
         other.add_argument(
-            "--out", default=f"{name}.scene", help=f"X.scene (ready to bake) or X.glb; {name}.scene by default"
+            "-o", "--out", default=f"{name}.scene", help=f"X.scene (ready to bake) or X.glb; {name}.scene by default"
         )
         for count, (usual, what) in counts.items():
             other.add_argument(f"--{count}", type=_whole(1), default=usual, help=what)
@@ -185,7 +185,7 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
         metavar="MODEL",
         help="IFC, glTF, OBJ, PLY, STL, DXF, a Quake .bsp, a scene folder, or cells and portals",
     )
-    bake.add_argument("--out", metavar="BAKE", help="folder to write; MODEL's name with .bake by default")
+    bake.add_argument("-o", "--out", metavar="BAKE", help="folder to write; MODEL's name with .bake by default")
     _add_numbers(bake)
     bake.add_argument(
         "--budget", type=_number, metavar="SECONDS", help="stop refining then; the rest is unknown, never hidden"
@@ -319,7 +319,7 @@ def _add_check(commands: argparse._SubParsersAction) -> None:
     check.add_argument("--rays", type=_whole(1), default=4_000_000, help="to cast; 4,000,000 by default")
     _add_numbers(check)
     _add_roles(check)
-    check.add_argument("--out", metavar="FOLDER", help="where to write all sightlines and the cells' numbers")
+    check.add_argument("-o", "--out", metavar="FOLDER", help="where to write all sightlines and the cells' numbers")
     check.add_argument("--shown", type=_whole(1), default=10, help="lines of each table; 10 by default")
     check.add_argument("--replay", metavar="FOLDER", help="judge the sightlines in an earlier check's folder again")
     check.add_argument("--no-progress", action="store_true", help="no progress bar")
@@ -354,7 +354,7 @@ def _add_tune_points(solvers: argparse._SubParsersAction) -> None:
     )
     points.add_argument("bake", metavar="BAKE", help="bake folder of a model")
     points.add_argument("--cells", type=_whole(1), default=8, help="view cells to try them on; 8 by default")
-    points.add_argument("--out", metavar="FOLDER", help="folder to write; BAKE's name with .tune by default")
+    points.add_argument("-o", "--out", metavar="FOLDER", help="folder to write; BAKE's name with .tune by default")
     points.add_argument("--no-progress", action="store_true", help="no progress bar")
     _seed(points, "the view cells and random points")
 
@@ -382,7 +382,7 @@ def _add_tune_lod(solvers: argparse._SubParsersAction) -> None:
     lod.add_argument(
         "--always", type=lambda text: text.split(","), default=[], metavar="KIND,KIND", help="kinds never left out"
     )
-    lod.add_argument("--out", metavar="FOLDER", help="folder to write; BAKE's name with .tune by default")
+    lod.add_argument("-o", "--out", metavar="FOLDER", help="folder to write; BAKE's name with .tune by default")
     lod.add_argument("--no-progress", action="store_true", help="no progress bar")
     _seed(lod, "the walk and the sampled frames")
 
@@ -391,7 +391,7 @@ def _add_report(commands: argparse._SubParsersAction) -> None:
     report = _command(commands, "report", "report", "Write plans, sets and numbers of a bake as a page.")
     report.add_argument("bake", metavar="BAKE", help="bake folder")
     report.add_argument("--cells", type=_cells, metavar="ID,ID", help="cells to show; three telling ones by default")
-    report.add_argument("--out", metavar="FOLDER", help="folder to write; BAKE/report by default")
+    report.add_argument("-o", "--out", metavar="FOLDER", help="folder to write; BAKE/report by default")
     report.add_argument(
         "--curves", metavar="FILE", help="curves of time against error to show; FOLDER/curves.json by default"
     )
@@ -408,6 +408,7 @@ def _add_curves(commands: argparse._SubParsersAction) -> None:
     curves.add_argument("--device", default="cpu", help="of --stability, such as cuda:0; cpu by default")
     curves.add_argument("--cells", type=_whole(1), default=8, help="view cells to sweep over; 8 by default")
     curves.add_argument(
+        "-o",
         "--out",
         metavar="FOLDER",
         help="folder for curves.json and .png; BAKE/report by default, where report finds them",

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from ..data.errors import InputError
 from .summary import summary, table
-from .terminal import FAILED, INTERRUPTED, complain, say, silenced
+from .terminal import FAILED, INTERRUPTED, complain, say
 
 if TYPE_CHECKING:
     from ..data.scene import Scene
@@ -74,7 +74,6 @@ def _scene_writer(options: argparse.Namespace) -> tuple[Path, Callable[["Scene",
 
 def inspect(options: argparse.Namespace) -> int:
     """Say whether a model is fit to bake; the exit code says so, too."""
-    _start_warp()
     from .inspect.run import inspect as look
 
     if options.picture and Path(options.picture).suffix.lower() not in (".png", ".svg"):
@@ -96,7 +95,6 @@ def bake(options: argparse.Namespace) -> int:
     from .bake.settings import Settings
     from .bake.settings_file import SettingsFile, read_settings
 
-    _start_warp()
     model = Path(options.model)
     asked = {field.name: getattr(options, field.name, None) for field in fields(Settings)}
     given = {name: value for name, value in asked.items() if value is not None}
@@ -178,7 +176,6 @@ def verify(options: argparse.Namespace) -> int:
     """Check a bake, or one case; the exit code says whether it stood."""
     from .baked import load
 
-    _start_warp()
     if options.hard_cases:
         return _hard_cases(options)
     if options.device is not None:
@@ -218,7 +215,6 @@ def _hard_cases(options: argparse.Namespace) -> int:
 
 def check(options: argparse.Namespace) -> int:
     """Check claims of any baker; the exit code says whether something visible was found hidden."""
-    _start_warp()
     from ..data.store.scene_folder import refuse_others
     from .check.folder import replay, write_check
     from .check.run import check as look
@@ -253,7 +249,6 @@ def tune_points(options: argparse.Namespace) -> int:
     from .baked import load
     from .tune.points import point_lines, tune_projection_point
 
-    _start_warp()
     found = tune_projection_point(
         load(options.bake), cells=options.cells, seed=options.seed, out=options.out, progress=_progress(options)
     )
@@ -269,7 +264,6 @@ def tune_lod(options: argparse.Namespace) -> int:
     from .baked import load
 
     screen = Screen(*options.image, options.fov)
-    _start_warp()
     made = load(options.bake)
     from ..solvers.levels.benefit import BenefitSettings
     from .tune.candidates import default_out
@@ -309,7 +303,6 @@ def report(options: argparse.Namespace) -> int:
 
 def bench(options: argparse.Namespace) -> int:
     """Measure, print the table, write it down and compare it with an earlier run."""
-    _start_warp()
     from .bench.against import compare, load_bench
     from .bench.run import bench as run
     from .bench.run import check_writable, write_bench
@@ -338,15 +331,6 @@ def bench(options: argparse.Namespace) -> int:
     return FAILED if worse or result.wrong_hidden else 0
 
 
-def _start_warp() -> None:
-    """Start Warp without its greeting, and without its warning that there is no GPU, which no setting silences."""
-    import warp
-
-    warp.config.log_level = warp.LOG_WARNING
-    with silenced(2):
-        warp.init()
-
-
 def _progress(options: argparse.Namespace) -> bool:
     """Whether to show a bar: only to somebody who watches."""
     return not options.no_progress and sys.stderr.isatty()
@@ -360,7 +344,6 @@ def curves(options: argparse.Namespace) -> int:
 
     if options.stability == (options.bake is not None):
         raise InputError("curves: expected a bake folder or --stability, found both or neither")
-    _start_warp()
     if options.stability:
         return _stability(options)
     made = load(options.bake)

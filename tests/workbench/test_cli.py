@@ -220,3 +220,11 @@ def test_readme_example_prints_what_the_readme_says(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
     # Warp greets on stdout before.
     assert done.stdout.endswith(expected)
+
+
+def test_short_options_and_the_package_as_a_command(tmp_path, graph):
+    command = [sys.executable, "-m", "viewcell"]
+    said = subprocess.run([*command, "-V"], capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert said.stdout == f"viewcell {viewcell.__version__}\n" and said.stderr == ""
+    assert main(["bake", str(graph), "-o", str(tmp_path / "short.bake"), "--no-progress"]) == 0
+    assert (tmp_path / "short.bake" / "manifest.json").exists()

@@ -13,6 +13,7 @@ from tqdm import tqdm
 from ... import __version__
 from ...data.camera import CameraPath, Screen
 from ...data.errors import InputError
+from ...data.silence import silenced
 from ...data.store.bake_folder import BakeFolder
 from ...kernels.select import launch_select
 from ...solvers.levels.benefit import (
@@ -37,7 +38,6 @@ from ...solvers.levels.select_frames import (
 )
 from ..files import write_files
 from ..pages import html_page
-from ..terminal import silenced
 from ..walk.path import potential_on, read_path, walk
 from ..walk.software_renderer import SAMPLE_FRAMES, SoftwareRenderer, fit_renderer, measure_samples
 from .outcomes import Outcome, Tuning, percent

@@ -7,6 +7,7 @@ import jax
 import numpy as np
 
 from ....data.scene import GRID_M
+from ....data.silence import silenced
 from ....kernels import select as select_kernels
 from ....kernels.launch import Device
 from ....kernels.select import Selections, launch_select
@@ -16,7 +17,6 @@ from ....solvers.referees import cone_point
 from ....solvers.result import Result
 from ....verify.exact.projection_point import relative_gap
 from ....verify.exact.select import best_by_milp, upper_bound
-from ...terminal import silenced
 from ..suite import Case, Errors
 
 LEVELS, FRAMES, SHARE = 5, 4, 0.3
