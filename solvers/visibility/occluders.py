@@ -178,11 +178,16 @@ def _clear(model: OccluderModel, plans: Plans, source: np.ndarray, boxes: np.nda
 
 
 def _hide_in_frames(model: OccluderModel, rows: Rows) -> Rows:
-    """Rows without those that a frame of their view cell hides."""
+    """Rows without those that a frame of their view cell hides, or the model's own frame in one piece."""
     kept = np.ones(len(rows), bool)
     for frame in model.frames:
         mine = np.flatnonzero(~rows.seen & (frame.places(rows.source) >= 0))
         kept[mine] = ~frame.hides(rows.source[mine], rows.target[mine], PIECE_CAP)
+        # As the descent over the hierarchy ends, for those that came here without it.
+        mine = mine[kept[mine]]
+        bounds = model.occludees.bounds[rows.target[mine]]
+        clear = np.flatnonzero(_clear(model, NO_PLANS, rows.source[mine], bounds))
+        kept[mine[clear]] = ~_hide_nodes(model, None, rows.source[mine[clear]], bounds[clear])
     return rows.take(kept)
 
 
