@@ -126,8 +126,14 @@ def test_tunes_an_office(office, tmp_path, capsys):
     assert header.replace('"', "") == "primitives,pixels,objects,seconds" and len(rows) == 48
 
 
-def test_coherence_changes_fewer_levels_and_loses_no_more_than_its_slack(office):
-    result = tune_lod(load(office / "office.bake"), frames=40, screen=tuning.Screen(64, 48))
+def test_coherence_changes_fewer_levels_and_loses_no_more_than_its_slack(office, tmp_path):
+    # Costs that are measured depend on what else the machine does.
+    work = np.random.default_rng(0).integers(100, 100_000, (40, 2))
+    rows = np.column_stack([work, 1e-4 + work @ [1e-8, 2e-9]])
+    np.savetxt(tmp_path / "gpu.csv", rows, delimiter=",", header="primitives,pixels,seconds", comments="", fmt="%.17g")
+    result = tune_lod(
+        load(office / "office.bake"), frames=40, screen=tuning.Screen(64, 48), samples=tmp_path / "gpu.csv"
+    )
     # HiGHS has solved a frame here and there: nothing can be said of flicker.
     assert {o.method for o in result.outcomes if o.switches is None} == {HIGHS}
     for budget in result.budgets_ms:
