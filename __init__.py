@@ -6,6 +6,8 @@ Names are imported on first use: Warp and JAX take seconds to import and `viewce
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from .data.version import __version__ as __version__
+
 if TYPE_CHECKING:
     # What editors and type checkers see; a test holds it to _HOME.
     from .data.buildings.office import make_office
@@ -19,8 +21,6 @@ if TYPE_CHECKING:
     from .workbench.check.run import assert_conservative, check
     from .workbench.inspect.run import inspect
     from .workbench.report.run import report
-
-__version__ = "0.1.0"
 
 _HOME = {
     "Bake": "viewcell.workbench.baked",

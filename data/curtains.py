@@ -77,12 +77,18 @@ def _add(boxes: list[np.ndarray], kinds: list[np.ndarray], quads: np.ndarray) ->
     kinds.append(kind)
 
 
-def _directions(triangles: np.ndarray, least: float) -> list[tuple[float, np.ndarray]]:
-    """Yaws of the larger upright faces that stand off the axes [degrees], and the depths of those faces along it."""
+def face_normals(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Normals of triangles, shape (n, 3), how long they are (twice the area), and which stand upright, bool."""
     edges = (triangles[:, 1:] - triangles[:, :1]).astype(float)
     normals = np.cross(edges[:, 0], edges[:, 1])
     size = np.linalg.norm(normals, axis=1)
-    rows = np.flatnonzero((np.abs(normals[:, 2]) <= UPRIGHT * size) & (normals[:, :2] != 0).all(axis=1))
+    return normals, size, np.abs(normals[:, 2]) <= UPRIGHT * size
+
+
+def _directions(triangles: np.ndarray, least: float) -> list[tuple[float, np.ndarray]]:
+    """Yaws of the larger upright faces that stand off the axes [degrees], and the depths of those faces along it."""
+    normals, size, upright = face_normals(triangles)
+    rows = np.flatnonzero(upright & (normals[:, :2] != 0).all(axis=1))
     if not len(rows):
         return []
     yaw = np.degrees(np.arctan2(normals[rows, 1], normals[rows, 0])) % 180.0

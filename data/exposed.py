@@ -41,6 +41,13 @@ class UprightFace:
         """Least and greatest height."""
         return int(self.corners[:, :, 2].min()), int(self.corners[:, :, 2].max())
 
+    @property
+    def along(self) -> tuple[np.ndarray, float]:
+        """Its direction in plan, of length 1, and how long it is [grid steps]."""
+        way = (self.ends[1] - self.ends[0]).astype(float)
+        length = float(np.hypot(*way))
+        return way / length, length
+
     @cached_property
     def bands(self) -> np.ndarray:
         """Heights between which it fills the whole segment, shape (n, 2), int64."""
@@ -78,14 +85,11 @@ def exposed_faces(closed: list[tuple[int, np.ndarray]]) -> dict[int, list[Uprigh
 
 def _backed(face: UprightFace, solid: np.ndarray) -> bool:
     """Whether a closed solid holds what lies behind a face of its: it is neither inside out nor thinner than a step."""
-    a, b = face.ends.astype(float)
-    length = float(np.hypot(*(b - a)))
-    along, left = (b - a) / length, np.array([a[1] - b[1], b[0] - a[0]]) / length
+    along, length = face.along
     short = min(SHORT, length / 4) * along
-    plan = np.array([a + short, b - short]) + BESIDE * left
-    bands = face.bands
-    quads = np.empty((len(bands), 2, 3))
-    quads[:, :, :2], quads[:, :, 2] = plan, bands
+    quads = np.empty((len(face.bands), 2, 3))
+    quads[:, :, :2] = face.ends + np.array([short, -short]) + BESIDE * np.array([-along[1], along[0]])
+    quads[:, :, 2] = face.bands
     return bool(inside(quads, solid, BESIDE / 2).all())
 
 
@@ -132,8 +136,8 @@ def face_pieces(face: UprightFace, longest: int) -> tuple[np.ndarray, np.ndarray
         of prisms are the face's own ends; between these they stand off it, as points of the grid seldom lie on it.
     """
     a, b = face.ends.astype(float)
-    length = float(np.hypot(*(b - a)))
-    along, inwards = (b - a) / length, np.array([a[1] - b[1], b[0] - a[0]]) / length
+    along, length = face.along
+    inwards = np.array([-along[1], along[0]])
     count = max(1, round(length / longest))
     share = np.arange(count + 1)[:, None] / count
     between, last = (share > 0) & (share < 1), np.select([share == 0, share == 1], [SHORT, -SHORT], 0.0)

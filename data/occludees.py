@@ -15,9 +15,9 @@ from .exposed import UprightFace, face_pieces
 from .frame import wall_yaw
 from .hierarchy import build_levels
 from .incidence import CHUNK, clip_bounds
-from .plans import NO_PLANS, Plans, are_convex, box_corners, plan_bounds, turned_plan
+from .plans import NO_PLANS, Plans, are_convex, box_corners, turned_plan
 from .ragged import owners_of, places_of
-from .scene import GRID_LIMIT, Scene, turned
+from .scene import Scene, bounds_by_owner, turned
 
 # Pieces are no smaller than this, and at most PIECES along an axis of their object.
 PIECE_M = 1.0
@@ -70,15 +70,10 @@ def find_occludees(scene: Scene, exposed: dict[int, list[UprightFace]] | None = 
             and the level ones are put into pieces, each face for itself. None by default.
     """
     bounds = scene.object_bounds()
-    present = np.flatnonzero((bounds[:, 0] <= bounds[:, 1]).all(axis=1))
-    levels, objects = build_levels(bounds[present])
-    # An empty node's -1 takes the last entry: -1.
-    objects = np.append(present, -1)[objects].astype(np.int32)
     pieces, plans, owner = _pieces(scene, bounds)
     if exposed:
         pieces, plans, owner = _face_by_face(scene, exposed, pieces, plans, owner)
-    starts = np.searchsorted(owner, np.arange(len(bounds) + 1))
-    return Occludees(bounds.astype(np.int32), levels, objects, pieces, plans, starts)
+    return _occludees(bounds, pieces, plans, owner)
 
 
 def turned_occludees(scene: Scene, yaw_deg: float) -> Occludees:
@@ -88,19 +83,25 @@ def turned_occludees(scene: Scene, yaw_deg: float) -> Occludees:
     """
     triangles, owners = scene.triangles()
     level = np.round(turned(triangles.astype(float), -yaw_deg)).astype(np.int64)
-    count, rounded = len(scene.objects), np.array([[-1, -1, 0], [1, 1, 0]])
-    bounds = np.empty((count, 2, 3), np.int64)
-    bounds[:, 0], bounds[:, 1] = GRID_LIMIT, -GRID_LIMIT
-    np.minimum.at(bounds[:, 0], owners, level.min(axis=1))
-    np.maximum.at(bounds[:, 1], owners, level.max(axis=1))
+    bounds, rounded = bounds_by_owner(level, owners, len(scene.objects)), np.array([[-1, -1, 0], [1, 1, 0]])
     pieces, owner = _cut(level, owners, bounds, round(PIECE_M / scene.grid_m))
-    present = np.flatnonzero((bounds[:, 0] <= bounds[:, 1]).all(axis=1))
-    bounds[present] += rounded
+    bounds[_present(bounds)] += rounded
+    return _occludees(bounds, (pieces + rounded).astype(np.int32), NO_PLANS, owner)
+
+
+def _present(bounds: np.ndarray) -> np.ndarray:
+    """Objects that have triangles, ascending."""
+    return np.flatnonzero((bounds[:, 0] <= bounds[:, 1]).all(axis=1))
+
+
+def _occludees(bounds: np.ndarray, pieces: np.ndarray, plans: Plans, owner: np.ndarray) -> Occludees:
+    """Occludees of bounds, and of pieces in the order of their objects."""
+    present = _present(bounds)
     levels, objects = build_levels(bounds[present])
+    # An empty node's -1 takes the last entry: -1.
     objects = np.append(present, -1)[objects].astype(np.int32)
-    starts = np.searchsorted(owner, np.arange(count + 1))
-    pieces = (pieces + rounded).astype(np.int32)
-    return Occludees(bounds.astype(np.int32), levels, objects, pieces, NO_PLANS, starts)
+    starts = np.searchsorted(owner, np.arange(len(bounds) + 1))
+    return Occludees(bounds.astype(np.int32), levels, objects, pieces, plans, starts)
 
 
 def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, Plans, np.ndarray]:
@@ -122,13 +123,7 @@ def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, Plans, np.nda
     tighter = (total[1] > 0) & (total[1] < TIGHTER * total[0])
     boxes, owner = boxes[~tighter[owner]], owner[~tighter[owner]]
     corners, oblique = corners[tighter[oblique]], oblique[tighter[oblique]]
-    around = np.full((len(corners), 2, 3), 0)
-    around[:, :, :2] = plan_bounds(corners[:, :, :2])
-    around[:, 0, 2], around[:, 1, 2] = corners[:, 0, 2], corners[:, 2, 2]
-    place = np.concatenate([np.full(len(boxes), -1), np.arange(len(corners))])
-    boxes, owner = np.concatenate([boxes, around]), np.concatenate([owner, oblique])
-    order = np.argsort(owner, kind="stable")
-    boxes, owner, place = boxes[order], owner[order], place[order]
+    boxes, place, owner = _in_order(boxes, owner, corners, oblique)
     first = np.searchsorted(owner, np.arange(len(bounds) + 1))
     count = np.diff(first)[models]
     objects = np.repeat(np.arange(len(bounds)), count)
@@ -139,41 +134,50 @@ def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, Plans, np.nda
     return (boxes[row] + shift[:, None]).astype(np.int32), Plans(rows, plans.astype(np.int32)), objects
 
 
+def _in_order(
+    boxes: np.ndarray, owner: np.ndarray, corners: np.ndarray, oblique: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Boxes and prisms, (n, 4, 3) each, as pieces in the order of their objects.
+
+    Returns:
+        Boxes, place of each piece among the prisms, -1 for a plain box, and the object of each.
+    """
+    around = np.stack([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    place = np.concatenate([np.full(len(boxes), -1), np.arange(len(corners))])
+    boxes, owner = np.concatenate([boxes, around]), np.concatenate([owner, oblique])
+    order = np.argsort(owner, kind="stable")
+    return boxes[order], place[order], owner[order]
+
+
 def _face_by_face(
     scene: Scene, exposed: dict[int, list[UprightFace]], pieces: np.ndarray, plans: Plans, owner: np.ndarray
 ) -> tuple[np.ndarray, Plans, np.ndarray]:
     """Pieces, plans and owners as of `_pieces`, with those of some objects replaced by pieces of their faces."""
     least, starts, triangles = round(PIECE_M / scene.grid_m), scene.triangle_starts, scene.triangles()[0]
     kept = ~np.isin(owner, list(exposed))
-    place = plans.places(len(pieces))[kept]
-    boxes, corners = [pieces[kept]], [plans.corners[place[place >= 0]]]
-    owners, planned = [owner[kept]], [place >= 0]
+    planned = np.zeros(len(pieces), bool)
+    planned[plans.rows] = True
+    upright = np.concatenate([plans.corners, np.repeat(pieces[plans.rows][:, :, 2], 2, axis=1)[:, :, None]], axis=2)
+    boxes, owners = [pieces[kept & ~planned]], [owner[kept & ~planned]]
+    prisms, oblique = [upright[kept[plans.rows]]], [owner[kept & planned]]
     for object_id, faces in exposed.items():
         own = triangles[starts[object_id] : starts[object_id + 1]]
         level = own[np.ptp(own[:, :, 2], axis=1) == 0]
+        one = np.zeros(len(level), np.int64)
         yaw = _yaws(own, np.zeros(len(own), np.int64), 1)
         found = [face_pieces(face, 2 * least) for face in faces]
-        prisms = [corner for _, corner in found]
         if yaw[0]:
-            prisms.append(_cut_turned(level, np.zeros(len(level), np.int64), yaw, least)[0])
-            flat = np.zeros((0, 2, 3), np.int64)
+            found.append((np.zeros((0, 2, 3), np.int64), _cut_turned(level, one, yaw, least)[0]))
         else:
-            flat, _ = _cut(
-                level, np.zeros(len(level), np.int64), np.array([[own.min(axis=(0, 1)), own.max(axis=(0, 1))]]), least
-            )
-        prisms = np.concatenate(prisms)
-        around = np.stack([prisms.min(axis=1), prisms.max(axis=1)], axis=1)
-        boxes += [*(box for box, _ in found), flat, around]
-        corners.append(prisms[:, :, :2])
-        plain = sum(len(box) for box, _ in found) + len(flat)
-        planned.append(np.arange(plain + len(prisms)) >= plain)
-        owners.append(np.full(plain + len(prisms), object_id))
-    boxes, corners = np.concatenate(boxes).astype(np.int32), np.concatenate(corners).astype(np.int32)
-    planned, owners = np.concatenate(planned), np.concatenate(owners)
-    place = np.where(planned, np.cumsum(planned) - 1, -1)
-    order = np.argsort(owners, kind="stable")
-    rows = np.flatnonzero(place[order] >= 0)
-    return boxes[order], Plans(rows, corners[place[order][rows]]), owners[order]
+            around = np.array([[own.min(axis=(0, 1)), own.max(axis=(0, 1))]])
+            found.append((_cut(level, one, around, least)[0], np.zeros((0, 4, 3), np.int64)))
+        for parts, names, new in zip((boxes, prisms), (owners, oblique), zip(*found, strict=True), strict=True):
+            parts += new
+            names.append(np.full(sum(map(len, new)), object_id))
+    joined = [np.concatenate(part) for part in (boxes, owners, prisms, oblique)]
+    pieces, place, owner = _in_order(*joined)
+    rows = np.flatnonzero(place >= 0)
+    return pieces.astype(np.int32), Plans(rows, joined[2][place[rows], :, :2].astype(np.int32)), owner
 
 
 def _yaws(triangles: np.ndarray, owners: np.ndarray, count: int) -> np.ndarray:

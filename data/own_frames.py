@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .blockers import Blockers
-from .curtains import LEAST_M2, NEAR_DEG, THIN_M, UPRIGHT, cuts_inside, inside, largest_sections
+from .curtains import LEAST_M2, NEAR_DEG, THIN_M, cuts_inside, face_normals, inside, largest_sections
 from .frame import LEAST_DEG
 from .graph import OTHER_AXES
 from .hierarchy import build_hierarchy
@@ -114,10 +114,7 @@ def _area(corners: np.ndarray) -> np.ndarray:
 def _wall_directions(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Direction of each upright opaque triangle, from 0 to 90 degrees, and its weight: long walls say it best."""
     triangles, _ = scene.triangles(*OPAQUE)
-    edges = (triangles[:, 1:] - triangles[:, :1]).astype(float)
-    normals = np.cross(edges[:, 0], edges[:, 1])
-    size = np.linalg.norm(normals, axis=1)
-    upright = np.abs(normals[:, 2]) <= UPRIGHT * size
+    normals, size, upright = face_normals(triangles)
     extent = np.ptp(triangles[upright][:, :, :2], axis=1).astype(float)
     yaw = np.degrees(np.arctan2(normals[upright, 1], normals[upright, 0])) % 90.0
     return yaw, size[upright] * np.hypot(extent[:, 0], extent[:, 1])
@@ -173,10 +170,7 @@ def _flat_boxes(rectangles: np.ndarray, axis: int, k: int) -> np.ndarray:
 
 def _faces_along(flat: np.ndarray, least: float) -> list[np.ndarray]:
     """Triangles of an element that are upright faces across the x axis of a frame, and across y, if they are enough."""
-    edges = flat[:, 1:] - flat[:, :1]
-    normals = np.cross(edges[:, 0], edges[:, 1])
-    size = np.linalg.norm(normals, axis=1)
-    upright = np.abs(normals[:, 2]) <= UPRIGHT * size
+    normals, size, upright = face_normals(flat)
     found = []
     for axis in (0, 1):
         off = np.abs(normals[:, 1 - axis]) <= np.sin(np.radians(NEAR_DEG)) * size
@@ -197,9 +191,7 @@ def _levels(flat: np.ndarray, level: np.ndarray, least: float) -> list[tuple[int
         Height, and rectangles (n, 2, 2), int64, of each.
     """
     low, high = level[:, :, 2].min(axis=1), level[:, :, 2].max(axis=1)
-    edges = flat[:, 1:] - flat[:, :1]
-    normals = np.cross(edges[:, 0], edges[:, 1])
-    upright = np.abs(normals[:, 2]) <= UPRIGHT * np.linalg.norm(normals, axis=1)
+    _, _, upright = face_normals(flat)
     found = []
     for below, heights in ((True, high), (False, low)):
         for k in np.unique(heights[low == high]).tolist():

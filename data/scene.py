@@ -252,12 +252,16 @@ class Scene:
 
     def object_bounds(self) -> np.ndarray:
         """Snapped box of each object [grid steps], shape (objects, 2, 3), int64; empty objects get min > max."""
-        triangles, owners = self.triangles()
-        bounds = np.empty((len(self.objects), 2, 3), np.int64)
-        bounds[:, 0], bounds[:, 1] = GRID_LIMIT, -GRID_LIMIT
-        np.minimum.at(bounds[:, 0], owners, triangles.min(axis=1))
-        np.maximum.at(bounds[:, 1], owners, triangles.max(axis=1))
-        return bounds
+        return bounds_by_owner(*self.triangles(), len(self.objects))
+
+
+def bounds_by_owner(triangles: np.ndarray, owners: np.ndarray, count: int) -> np.ndarray:
+    """Boxes around the triangles of each of so many owners [grid steps], (count, 2, 3), int64; min > max for none."""
+    bounds = np.empty((count, 2, 3), np.int64)
+    bounds[:, 0], bounds[:, 1] = GRID_LIMIT, -GRID_LIMIT
+    np.minimum.at(bounds[:, 0], owners, triangles.min(axis=1))
+    np.maximum.at(bounds[:, 1], owners, triangles.max(axis=1))
+    return bounds
 
 
 def turned(points: np.ndarray, yaw_deg: float) -> np.ndarray:

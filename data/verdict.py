@@ -2,6 +2,8 @@
 
 from enum import IntEnum
 
+import numpy as np
+
 
 class Verdict(IntEnum):
     """VISIBLE has a witness sightline, HIDDEN has a proof, UNKNOWN has neither and is kept as potential.
@@ -17,3 +19,8 @@ class Verdict(IntEnum):
     def word(self) -> str:
         """As tables of a bake and messages have it."""
         return self.name.lower()
+
+    @classmethod
+    def words(cls, verdicts: np.ndarray) -> np.ndarray:
+        """Words of an array of verdicts, of the same shape, object."""
+        return np.array([verdict.word for verdict in cls], object)[verdicts]

@@ -11,13 +11,12 @@ import pyarrow as pa
 from ..data.scene import CORNERS
 from ..data.store.bake_folder import WITNESS, BakeFolder, read_bake
 from ..data.store.scene_folder import read_table
+from ..data.store.scene_tables import BOX_COLUMNS
 from ..data.verdict import Verdict
 from .places import Place, cell_at, cells_at, object_at
 
 if TYPE_CHECKING:
     from ..verify.findings import VerifyResult
-
-BOX = ("min_x", "min_y", "min_z", "max_x", "max_y", "max_z")
 
 
 @dataclass(frozen=True)
@@ -60,12 +59,12 @@ class Bake(BakeFolder):
         Boxes are in the model's own metres; null where nothing is left of an object on the grid.
         """
         table = read_table(self.folder / "objects.parquet", ())
-        boxes = np.stack([table[name].to_numpy(zero_copy_only=False) for name in BOX], axis=1).reshape(-1, 2, 3)
+        boxes = np.stack([table[name].to_numpy(zero_copy_only=False) for name in BOX_COLUMNS], axis=1).reshape(-1, 2, 3)
         corners = self.in_model(boxes[:, CORNERS, np.arange(3)])
         around = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
         lost = np.isnan(around).any(axis=1)
-        table = table.drop_columns(["definition_id", "transform", *BOX])
-        for column, name in enumerate(BOX):
+        table = table.drop_columns(["definition_id", "transform", *BOX_COLUMNS])
+        for column, name in enumerate(BOX_COLUMNS):
             table = table.append_column(name, pa.array(around[:, column], mask=lost))
         return table
 

@@ -8,8 +8,8 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
-from .. import __version__
 from ..data.errors import InputError
+from ..data.version import __version__
 from .terminal import INTERRUPTED, UNUSABLE, complain
 
 # Seeds go to kernels as int32.

@@ -341,9 +341,8 @@ def _witness_columns(rows: Rows, grid_m: float) -> dict[str, pa.Array]:
 
 
 def _pair_columns(rows: Rows, target: str) -> dict[str, pa.Array]:
-    words = np.array([verdict.word for verdict in Verdict], object)[rows.verdict]
     source, reached = (pa.array(column.astype(np.int32)) for column in (rows.source, rows.target))
-    return {"cell_id": source, target: reached, "verdict": pa.array(words, pa.string())}
+    return {"cell_id": source, target: reached, "verdict": pa.array(Verdict.words(rows.verdict), pa.string())}
 
 
 def _cell_to_cell_table(rows: Rows, grid_m: float) -> pa.Table:

@@ -67,8 +67,8 @@ def _room_words(room: dict) -> str:
 
 
 def _pairs(columns: tuple[str, ...], room: np.ndarray, target: np.ndarray, verdict: np.ndarray) -> pa.Table:
-    words = np.array([one.word for one in Verdict], object)[verdict]
-    values = pa.array(room.astype(np.int32)), pa.array(target.astype(np.int32)), pa.array(words, pa.string())
+    words = pa.array(Verdict.words(verdict), pa.string())
+    values = pa.array(room.astype(np.int32)), pa.array(target.astype(np.int32)), words
     return pa.table(dict(zip(columns, values, strict=True)))
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import __version__
 from ...data.graph import CellGraph
 from ...data.rows import Rows
 from ...data.scene import Scene
 from ...data.store.scene_folder import FORMAT, PLAN_FORMAT
+from ...data.version import __version__
 from .settings import Settings
 
 

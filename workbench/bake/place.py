@@ -7,9 +7,9 @@ from dataclasses import asdict
 from itertools import chain, count
 from pathlib import Path
 
-from ... import __version__
 from ...data.errors import InputError
 from ...data.store.scene_folder import OLD, WRITING, held_manifest, refuse_others
+from ...data.version import __version__
 from .blocks import PARTIAL
 from .settings import Settings
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from tqdm import tqdm
 
-from ... import __version__
 from ...data.errors import InputError
+from ...data.version import __version__
 from ...kernels.launch import Device
 from ..summary import table
 from . import suite as suites

@@ -11,7 +11,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ... import __version__
 from ...data.errors import InputError
 from ...data.ragged import starts_of
 from ...data.scene import OPAQUE, Role
@@ -19,6 +18,7 @@ from ...data.store.bake_folder import WITNESS
 from ...data.store.graph_folder import CELL_COLUMNS, numbers
 from ...data.store.quake import axial_graph, read_prt
 from ...data.store.scene_folder import FORMAT, new_folder, read_manifest, read_table
+from ...data.version import __version__
 from ...data.view_cells import as_graph
 from ...verify.check_result import CheckResult
 from ...verify.exact.sightline import Sightlines

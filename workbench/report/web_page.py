@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from ... import __version__
 from ...data.carving import find_faces
 from ...data.ragged import starts_of
 from ...data.scene import Role
+from ...data.version import __version__
 from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses
 from ..bake.worth import told_worth

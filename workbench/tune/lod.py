@@ -10,11 +10,11 @@ import pyarrow as pa
 import pyarrow.csv
 from tqdm import tqdm
 
-from ... import __version__
 from ...data.camera import CameraPath, Screen
 from ...data.errors import InputError
 from ...data.silence import silenced
 from ...data.store.bake_folder import BakeFolder
+from ...data.version import __version__
 from ...kernels.select import launch_select
 from ...solvers.levels.benefit import (
     BenefitSettings,
