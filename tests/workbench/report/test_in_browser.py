@@ -119,7 +119,7 @@ def test_a_browser_shows_what_is_clicked(browser, house, tmp_path):
     assert not house.potential_cells[0, 5] and "#d55e00" in shown.colours(cells[0])
     assert "#a9d8f3" in shown.colours(cells[2]) and shown.colours(cells[5]) == {"#ffffff"}
     assert "#f6d38a" in shown.colours(cells[4]) and len(shown.colours(cells[4])) > 1
-    assert shown.text(".targets").startswith("4 · study")
+    assert shown.text("#targets").startswith("4 · study")
     # Targets: seen, with its sightline through the doorway; unknown; hidden.
     shown.one("input[value=inspect]").click()
     shown.click(cells[2])
