@@ -127,6 +127,7 @@ def grow(blocked: np.ndarray, i: int, j: int, first: int) -> tuple[int, int, int
 
 def _run(row: np.ndarray, i: int) -> tuple[int, int]:
     """The run of true values around i: first and past-the-last index."""
-    after = np.flatnonzero(~row[i:])
-    before = np.flatnonzero(~row[:i])
-    return (int(before[-1]) + 1 if len(before) else 0), (i + int(after[0]) if len(after) else len(row))
+    ahead, behind = row[i:], row[i::-1]
+    last, first = int(ahead.argmin()), int(behind.argmin())
+    # The least of all true values is the first of them.
+    return (0 if behind[first] else i - first + 1), (len(row) if ahead[last] else i + last)

@@ -207,29 +207,54 @@ def _tips(quads: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndar
     edges = np.concatenate([t[:, [k, (k + 1) % 3]] for k in range(3)])
     upright = (edges[:, 0, :2] == edges[:, 1, :2]).all(axis=1)
     edges = np.unique(np.sort(edges[upright], axis=1), axis=0)
-    found: tuple[set, set] = set(), set()
-    for quad in quads:
-        for end in (0, 1):
-            along = quad[end, :2] - quad[1 - end, :2]
-            for low, high in edges:
-                way = low[:2] - quad[end, :2]
-                if not 0 < np.abs(way).max() <= TIP_STEPS or way @ along < 0:
-                    continue
-                z = max(int(low[2]), int(quad[0, 2])), min(int(high[2]), int(quad[1, 2]))
-                for far in (0, 1) if z[0] < z[1] else ():
-                    other = quad[1 - end if far else end, :2]
-                    a, b = sorted([tuple(low[:2].tolist()), tuple(other.tolist())])
-                    found[far].add(((*a, z[0]), (*b, z[1])))
-    return tuple(_opaque(np.array(sorted(part), np.int64).reshape(-1, 2, 3), triangles) for part in found)
+    if not len(quads):
+        return quads, quads
+    end, other = quads[:, [0, 1], :2], quads[:, [1, 0], :2]
+    low, high = edges[:, 0], edges[:, 1]
+    # Shape (quads, ends, edges, 2).
+    way = low[:, :2] - end[:, :, None]
+    reach = np.abs(way).max(axis=3)
+    near = (reach > 0) & (reach <= TIP_STEPS) & ((way * (end - other)[:, :, None]).sum(axis=3) >= 0)
+    quad, side, edge = np.nonzero(near)
+    z = np.stack([np.maximum(low[edge, 2], quads[quad, 0, 2]), np.minimum(high[edge, 2], quads[quad, 1, 2])], axis=1)
+    found = []
+    for begin in (end, other):
+        part = np.stack([low[edge, :2], begin[quad, side]], axis=1)
+        swap = np.lexsort(part.transpose(2, 0, 1)[::-1], axis=1)
+        part = np.concatenate([np.take_along_axis(part, swap[:, :, None], axis=1), z[:, :, None]], axis=2)
+        found.append(np.unique(part[z[:, 0] < z[:, 1]], axis=0))
+    return tuple(_opaque(part, triangles) for part in found)
 
 
 def _opaque(quads: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Those of some rectangles that lie inside a closed surface, borders aside; exactly."""
     quads = quads[np.abs(winding_numbers(quads.mean(axis=1), triangles)) > 0.5]
     clear = np.ones(len(quads), bool)
-    for row, near in zip(*meeting(quads, triangles, CLEAR_STEPS), strict=True):
-        clear[row] = clear[row] and not crossed(quads[row], triangles[near])
+    rows, near = meeting(quads, triangles, CLEAR_STEPS)
+    doubtful = ~clearly_missed(quads[rows], triangles[near])
+    for row, which in zip(rows[doubtful], near[doubtful], strict=True):
+        clear[row] = clear[row] and not crossed(quads[row], triangles[which])
     return quads[clear]
+
+
+def clearly_missed(quads: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Pairs, row by row, of which a few comparisons of whole numbers say that they are not `crossed`, shape (n,), bool.
+
+    What a triangle has in the plane of the rectangle lies between its corners; where none of its edges crosses that
+    plane inside, between those of its corners that lie in it.
+    """
+    a, way = quads[:, :1, :2].astype(np.int64), quads[:, 1, :2].astype(np.int64) - quads[:, 0, :2]
+    off = triangles[:, :, :2].astype(np.int64) - a
+    x, y = way[:, :1], way[:, 1:]
+    u, d = off[:, :, 0] * x + off[:, :, 1] * y, off[:, :, 1] * x - off[:, :, 0] * y
+    split = (d < 0).any(axis=1) & (d > 0).any(axis=1)
+    inside = (d == 0) | split[:, None]
+    missed = ~inside.any(axis=1)
+    far = np.iinfo(np.int64).max
+    for values, low, high in ((u, 0 * x[:, 0], (way**2).sum(axis=1)), (triangles[:, :, 2], *quads[:, :, 2].T)):
+        missed |= np.where(inside, values, far).min(axis=1) >= high
+        missed |= np.where(inside, values, -far).max(axis=1) <= low
+    return missed
 
 
 def crossed(quad: np.ndarray, triangle: np.ndarray) -> bool:

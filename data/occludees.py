@@ -240,22 +240,19 @@ def _plan_points(triangles: np.ndarray, rectangle: np.ndarray, yaw_deg: float) -
     flat, own = flat[near], triangles[near].reshape(-1, 3)[:, :2].astype(float)
     inside = ((flat >= low) & (flat <= high)).all(axis=2).ravel()
     crossings = []
-    for k in range(3):
-        a, b = flat[:, k], flat[:, (k + 1) % 3]
-        for axis in (0, 1):
-            rise = b[:, axis] - a[:, axis]
-            for border in (low[axis], high[axis]):
-                share = np.divide(border - a[:, axis], rise, out=np.full(len(a), -1.0), where=rise != 0)
-                point = a + share[:, None] * (b - a)
-                held = (share >= 0) & (share <= 1) & (point >= low - 1).all(axis=1) & (point <= high + 1).all(axis=1)
-                crossings.append(point[held])
+    a, edges = flat, np.roll(flat, -1, axis=1) - flat
+    for axis in (0, 1):
+        for border in (low[axis], high[axis]):
+            rise = edges[:, :, axis]
+            share = np.divide(border - a[:, :, axis], rise, out=np.full(rise.shape, -1.0), where=rise != 0)
+            point = a + share[:, :, None] * edges
+            held = (share >= 0) & (share <= 1) & (point >= low - 1).all(axis=2) & (point <= high + 1).all(axis=2)
+            crossings.append(point[held])
     # Corners of the rectangle that a triangle lies under or over.
-    for corner in box_corners(np.array([low, high])):
-        edges = np.roll(flat, -1, axis=1) - flat
-        rest = corner - flat
-        turn = edges[:, :, 0] * rest[:, :, 1] - edges[:, :, 1] * rest[:, :, 0]
-        if ((turn >= 0).all(axis=1) | (turn <= 0).all(axis=1)).any():
-            crossings.append(corner[None])
+    corners = box_corners(np.array([low, high]))
+    rest = corners[:, None, None] - flat
+    turn = edges[:, :, 0] * rest[..., 1] - edges[:, :, 1] * rest[..., 0]
+    crossings.append(corners[((turn >= 0).all(axis=2) | (turn <= 0).all(axis=2)).any(axis=1)])
     return np.concatenate([own[inside], turned_plan(np.concatenate(crossings), yaw_deg)])
 
 

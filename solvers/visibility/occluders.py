@@ -40,6 +40,8 @@ SMALLEST_M = (0.0625, 0.0625)
 SHAFT_CAP = 200
 # An object with so many pieces that could not be hidden is not looked at further: they are enough to aim at.
 OPEN_ENOUGH = 3
+# Sightlines shot near each line that a frame lets pass, round by round.
+FRAME_ROUNDS = AIM_ROUNDS[:2]
 
 
 @dataclass
@@ -178,16 +180,26 @@ def _clear(model: OccluderModel, plans: Plans, source: np.ndarray, boxes: np.nda
 
 
 def _hide_in_frames(model: OccluderModel, rows: Rows) -> Rows:
-    """Rows without those that a frame of their view cell hides, or the model's own frame in one piece."""
+    """Rows without those that a frame of their view cell hides, or the model's own frame in one piece.
+
+    Others are shot at along lines that pass all walls of the frame: those stand along it, and lines lead best there.
+    """
     kept = np.ones(len(rows), bool)
     for frame in model.frames:
         mine = np.flatnonzero(~rows.seen & (frame.places(rows.source) >= 0))
-        kept[mine] = ~frame.hides(rows.source[mine], rows.target[mine], PIECE_CAP)
+        hidden, passing = frame.hides(rows.source[mine], rows.target[mine], PIECE_CAP)
         # As the descent over the hierarchy ends, for those that came here without it.
-        mine = mine[kept[mine]]
-        bounds = model.occludees.bounds[rows.target[mine]]
-        clear = np.flatnonzero(_clear(model, NO_PLANS, rows.source[mine], bounds))
-        kept[mine[clear]] = ~_hide_nodes(model, None, rows.source[mine[clear]], bounds[clear])
+        left = np.flatnonzero(~hidden)
+        bounds = model.occludees.bounds[rows.target[mine[left]]]
+        clear = np.flatnonzero(_clear(model, NO_PLANS, rows.source[mine[left]], bounds))
+        hidden[left[clear]] = _hide_nodes(model, None, rows.source[mine[left[clear]]], bounds[clear])
+        kept[mine] = ~hidden
+        passing = passing.take(~hidden[passing.row])
+        pairs = mine[passing.row]
+        for number, tries in enumerate(FRAME_ROUNDS):
+            todo = np.flatnonzero(~rows.seen[pairs])
+            at = pairs[todo]
+            model.sights.aim(rows, at, passing.boxes[todo], passing.lines[todo], rows.target[at], tries, number + 1)
     return rows.take(kept)
 
 

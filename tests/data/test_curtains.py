@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from builders import random_solids
-from viewcell.data.curtains import FALLING, crossed, find_curtains, meeting
+from viewcell.data.curtains import FALLING, clearly_missed, crossed, find_curtains, meeting
 from viewcell.data.prepared import PreparedModel
 from viewcell.data.scene import GRID_M
 from viewcell.verify.proofs.curtain import is_opaque
@@ -148,4 +148,20 @@ def test_what_may_meet_a_rectangle_holds_what_meets_it():
     ],
 )
 def test_touching_the_border_is_not_crossing(triangle, expected):
-    assert crossed(np.array([[0, 0, 0], [40, 30, 40]]), np.array(triangle)) == expected
+    quad, triangle = np.array([[0, 0, 0], [40, 30, 40]]), np.array(triangle)
+    assert crossed(quad, triangle) == expected
+    assert clearly_missed(quad[None], triangle[None]).tolist() == [not expected]
+
+
+def test_what_is_clearly_missed_is_not_crossed():
+    """Small numbers, so that corners often lie in the plane or on the border; most that is missed is so clearly."""
+    random, missed, clear = np.random.default_rng(1), 0, 0
+    for _ in range(300):
+        quad = np.array([[0, 0, 0], [*random.integers(1, 5, 2), random.integers(1, 5)]])
+        triangles = random.integers(-3, 6, (20, 3, 3))
+        found = clearly_missed(np.broadcast_to(quad, (20, 2, 3)), triangles)
+        for said, triangle in zip(found.tolist(), triangles, strict=True):
+            met = crossed(quad, triangle)
+            assert not (said and met)
+            missed, clear = missed + (not met), clear + said
+    assert clear > 0.6 * missed > 2000

@@ -75,7 +75,7 @@ def test_what_is_shown_is_not_hidden(house, search):
     kept = set(zip(*(part.tolist() for part in search.left(np.arange(2), 3, 40)), strict=True))
     assert len(kept) < 2 * count
     source, target = np.repeat(np.arange(2), count), np.tile(np.arange(count), 2)
-    hidden = search.hides(source, target, 2000)
+    hidden, _ = search.hides(source, target, 2000)
     # The chest outside from both rooms, and the other room's chests.
     assert hidden.sum() >= 3
     hides = set(zip(source[hidden].tolist(), target[hidden].tolist(), strict=True))
@@ -84,6 +84,27 @@ def test_what_is_shown_is_not_hidden(house, search):
         assert len(seen) > 5
         for object_id in seen:
             assert (cell, object_id) in kept and (cell, object_id) not in hides
+
+
+def test_lines_past_a_frame_lead_from_the_cell_to_the_object(house, search):
+    """In the model's own frame: from inside the plan of the cell to the box around a piece of the object."""
+    model, cells, plans = house
+    count = len(model.scene.objects)
+    source, target = np.repeat(np.arange(2), count), np.tile(np.arange(count), 2)
+    hidden, passing = search.hides(source, target, 2000)
+    assert len(passing.row) > 10 and not hidden[passing.row].any()
+    start, end = passing.lines[:, 0], passing.lines[:, 1]
+    # The box in the frame is a few steps wider than the plan.
+    middle = cells[source[passing.row]].mean(axis=1)
+    assert plans.hold(source[passing.row], middle + 0.99 * (start - middle), len(cells)).all()
+    own = cells[source[passing.row]]
+    assert (start[:, 2] >= own[:, 0, 2]).all() and (start[:, 2] <= own[:, 1, 2]).all()
+    assert (end >= passing.boxes[:, 0]).all() and (end <= passing.boxes[:, 1]).all()
+    bounds = model.occludees.bounds[target[passing.row]]
+    # Rounding in the frame moves a piece by less than two steps.
+    assert ((passing.boxes[:, 0] < bounds[:, 1] + 2) & (passing.boxes[:, 1] > bounds[:, 0] - 2)).all()
+    second = passing.take(passing.row == passing.row[1])
+    assert (second.row == passing.row[1]).all() and (second.lines[0] == passing.lines[1]).all()
 
 
 def test_frames_serve_the_cells_that_they_fit(house):
