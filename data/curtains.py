@@ -18,6 +18,7 @@ import numpy as np
 from .blockers import Blockers, maximal_rectangles, paint
 from .hierarchy import build_hierarchy
 from .opaque import plane_rectangles
+from .progress import track
 from .regions import section_rectangles
 from .scene import turned
 from .solids import winding_numbers
@@ -55,7 +56,7 @@ def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float) 
     """
     least = LEAST_M2 / grid_m**2
     boxes, kinds = [np.zeros((0, 2, 3), np.int64)], [np.zeros(0, np.int64)]
-    for triangles in elements:
+    for triangles in track(elements, "curtains", "element"):
         quads = _sections(triangles, least, THIN_M / grid_m)
         if not len(quads):
             continue

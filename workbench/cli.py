@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from ..data.errors import InputError
 from ..data.version import __version__
-from .terminal import INTERRUPTED, UNUSABLE, complain
+from .terminal import INTERRUPTED, UNUSABLE, complain, watched
 
 # Seeds go to kernels as int32.
 SEED_LIMIT = 2**31
@@ -32,7 +32,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         from . import commands
 
-        return getattr(commands, options.run)(options)
+        with watched(options.verbose, options.quiet):
+            return getattr(commands, options.run)(options)
     except KeyboardInterrupt:
         complain("interrupted")
         return INTERRUPTED
@@ -114,6 +115,9 @@ def _command(commands: argparse._SubParsersAction, name: str, run: str, text: st
     """A sub-parser whose arguments are handed to the function `run` of `commands`."""
     parser = commands.add_parser(name, help=text, description=text)
     parser.set_defaults(run=run)
+    said = parser.add_mutually_exclusive_group()
+    said.add_argument("-v", "--verbose", action="store_true", help="a line on stderr about every phase")
+    said.add_argument("-q", "--quiet", "--no-progress", action="store_true", help="only results and complaints")
     return parser
 
 
@@ -195,7 +199,6 @@ def _add_bake(commands: argparse._SubParsersAction) -> None:
     bake.add_argument(
         "--overwrite", action="store_true", help="bake again, even if BAKE is up to date or of something else"
     )
-    bake.add_argument("--no-progress", action="store_true", help="no progress bar")
     bake.add_argument(
         "--settings",
         metavar="FILE",
@@ -289,7 +292,6 @@ def _add_verify(commands: argparse._SubParsersAction) -> None:
         "--hard-cases", action="store_true", help="put the hard cases that come with viewcell to every kernel instead"
     )
     verify.add_argument("--device", help="of the hard cases, such as cuda:0; the CPU and the first GPU by default")
-    verify.add_argument("--no-progress", action="store_true", help="no progress bar")
     _seed(verify, "origins and directions")
 
 
@@ -322,7 +324,6 @@ def _add_check(commands: argparse._SubParsersAction) -> None:
     check.add_argument("-o", "--out", metavar="FOLDER", help="where to write all sightlines and the cells' numbers")
     check.add_argument("--shown", type=_whole(1), default=10, help="lines of each table; 10 by default")
     check.add_argument("--replay", metavar="FOLDER", help="judge the sightlines in an earlier check's folder again")
-    check.add_argument("--no-progress", action="store_true", help="no progress bar")
     _seed(check, "rays")
 
 
@@ -355,7 +356,6 @@ def _add_tune_points(solvers: argparse._SubParsersAction) -> None:
     points.add_argument("bake", metavar="BAKE", help="bake folder of a model")
     points.add_argument("--cells", type=_whole(1), default=8, help="view cells to try them on; 8 by default")
     points.add_argument("-o", "--out", metavar="FOLDER", help="folder to write; BAKE's name with .tune by default")
-    points.add_argument("--no-progress", action="store_true", help="no progress bar")
     _seed(points, "the view cells and random points")
 
 
@@ -383,7 +383,6 @@ def _add_tune_lod(solvers: argparse._SubParsersAction) -> None:
         "--always", type=lambda text: text.split(","), default=[], metavar="KIND,KIND", help="kinds never left out"
     )
     lod.add_argument("-o", "--out", metavar="FOLDER", help="folder to write; BAKE's name with .tune by default")
-    lod.add_argument("--no-progress", action="store_true", help="no progress bar")
     _seed(lod, "the walk and the sampled frames")
 
 
@@ -413,7 +412,6 @@ def _add_curves(commands: argparse._SubParsersAction) -> None:
         metavar="FOLDER",
         help="folder for curves.json and .png; BAKE/report by default, where report finds them",
     )
-    curves.add_argument("--no-progress", action="store_true", help="no progress bar")
     _seed(curves, "the view cells and what the methods draw")
 
 
@@ -441,7 +439,6 @@ def _add_bench(commands: argparse._SubParsersAction) -> None:
         "--only", type=lambda text: text.split(","), default=[], metavar="KERNEL,KERNEL", help="measure these alone"
     )
     bench.add_argument("--graphs", metavar="FOLDER", help="flood cells and portals in it, or in folders in it, too")
-    bench.add_argument("--no-progress", action="store_true", help="no progress bar")
 
 
 def _add_clean(commands: argparse._SubParsersAction) -> None:

@@ -90,8 +90,8 @@ def inspect(options: argparse.Namespace) -> int:
 def bake(options: argparse.Namespace) -> int:
     """Bake a model and print what came of it."""
     from .bake.place import leftovers
+    from .bake.run import Interrupted, default_out
     from .bake.run import bake as compute
-    from .bake.run import default_out
     from .bake.settings import Settings
     from .bake.settings_file import SettingsFile, read_settings
 
@@ -113,12 +113,9 @@ def bake(options: argparse.Namespace) -> int:
             threads=options.threads,
             device=options.device,
             overwrite=options.overwrite,
-            progress=_progress(options),
             tuned=file.tuned,
         )
-    except KeyboardInterrupt:
-        if not any(any(part.glob("*.arrow")) for part in leftovers(out.absolute().parent, out.name)):
-            raise
+    except Interrupted:
         complain("interrupted; the same command goes on from there")
         return INTERRUPTED
     say(summary(made))
@@ -197,7 +194,7 @@ def verify(options: argparse.Namespace) -> int:
         found = check_certificates(made)
         say("\n".join([found.line(), *(f"refuted: {line}" for line in found.examples)]))
         return FAILED if found.failed else 0
-    result = made.verify(rays=options.rays, seed=options.seed, progress=_progress(options))
+    result = made.verify(rays=options.rays, seed=options.seed)
     say(result.table())
     return 0 if result.ok else FAILED
 
@@ -234,7 +231,6 @@ def check(options: argparse.Namespace) -> int:
         rays=options.rays,
         seed=options.seed,
         targets=options.targets,
-        progress=_progress(options),
         **_reading(options),
     )
     say(result.table(options.shown))
@@ -249,9 +245,7 @@ def tune_points(options: argparse.Namespace) -> int:
     from .baked import load
     from .tune.points import point_lines, tune_projection_point
 
-    found = tune_projection_point(
-        load(options.bake), cells=options.cells, seed=options.seed, out=options.out, progress=_progress(options)
-    )
+    found = tune_projection_point(load(options.bake), cells=options.cells, seed=options.seed, out=options.out)
     say(point_lines(found))
     if found.wrong_hidden:
         print(f"viewcell: {found.wrong_hidden} pairs hidden although seen; this is a bug", file=sys.stderr)
@@ -280,7 +274,6 @@ def tune_lod(options: argparse.Namespace) -> int:
         samples=options.samples,
         benefit=benefit,
         seed=options.seed,
-        progress=_progress(options),
     )
     say(result.text())
     asked = {"frames": options.frames, "path": options.path, "samples": options.samples, "seed": options.seed}
@@ -315,7 +308,6 @@ def bench(options: argparse.Namespace) -> int:
         device=options.device,
         only=options.only,
         graphs=options.graphs,
-        progress=_progress(options),
     )
     say(result.text())
     found, worse = result.json(), False
@@ -331,11 +323,6 @@ def bench(options: argparse.Namespace) -> int:
     return FAILED if worse or result.wrong_hidden else 0
 
 
-def _progress(options: argparse.Namespace) -> bool:
-    """Whether to show a bar: only to somebody who watches."""
-    return not options.no_progress and sys.stderr.isatty()
-
-
 def curves(options: argparse.Namespace) -> int:
     """Sweep the knobs, draw the curves and say which settings are worth their time."""
     from .baked import load
@@ -347,7 +334,7 @@ def curves(options: argparse.Namespace) -> int:
     if options.stability:
         return _stability(options)
     made = load(options.bake)
-    found = sweep(made, cells=options.cells, seed=options.seed, progress=_progress(options))
+    found = sweep(made, cells=options.cells, seed=options.seed)
     folder = Path(options.out) if options.out else Path(made.folder) / "report"
     write_curves(found, folder)
     say(curve_lines(found))
@@ -359,7 +346,7 @@ def _stability(options: argparse.Namespace) -> int:
     """Error of the kernels as numbers get hard."""
     from .hard.stability import FLOAT32, measure_stability, stability_table, write_stability
 
-    rows = measure_stability(seed=options.seed, device=options.device, progress=_progress(options))
+    rows = measure_stability(seed=options.seed, device=options.device)
     folder = Path(options.out or "stability")
     write_stability(rows, folder)
     say(stability_table(rows))

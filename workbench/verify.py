@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from tqdm import tqdm
 
 from ..data.errors import InputError
+from ..data.progress import phase, shown, track
 from ..data.scene import OPAQUE, Role
 from ..verify.cases.case_file import WrongHidden, read_case, write_case
 from ..verify.exact.sightline import Sightlines
@@ -59,21 +59,24 @@ def verify_bake(bake: "BakeFolder", *, rays: int = 1_000_000, seed: int = 0, pro
     if rays < 0:
         raise InputError(f"rays: expected 0 or more, found {rays}")
     result, start = VerifyResult(), time.perf_counter()
-    judge = make_judge(bake)
-    caster, dark = make_caster(bake, judge, (bake.potential_cells, bake.potential_objects), rays, seed)
-    result.dark_cells = len(dark)
-    result.seconds["prepare"] = time.perf_counter() - start
-    if rays and caster is not None:
-        _cast_all(bake, caster, judge, rays, progress, result)
-        if bake.scene is not None and not result.wrong_hidden:
-            _hunt(bake, caster, judge, rays // GUIDED, progress, result)
-    start = time.perf_counter()
-    _confirm_all(bake, judge, progress, result)
-    result.seconds["witnesses"] = time.perf_counter() - start
-    if has_certificates(bake):
+    with shown(progress):
+        with phase("prepare"):
+            judge = make_judge(bake)
+            caster, dark = make_caster(bake, judge, (bake.potential_cells, bake.potential_objects), rays, seed)
+        result.dark_cells = len(dark)
+        result.seconds["prepare"] = time.perf_counter() - start
+        if rays and caster is not None:
+            _cast_all(bake, caster, judge, rays, result)
+            if bake.scene is not None and not result.wrong_hidden:
+                _hunt(bake, caster, judge, rays // GUIDED, result)
         start = time.perf_counter()
-        result.certificates = check_certificates(bake)
-        result.seconds["certificates"] = time.perf_counter() - start
+        _confirm_all(bake, judge, result)
+        result.seconds["witnesses"] = time.perf_counter() - start
+        if has_certificates(bake):
+            start = time.perf_counter()
+            with phase("certificates"):
+                result.certificates = check_certificates(bake)
+            result.seconds["certificates"] = time.perf_counter() - start
     result.counts = count_pairs(bake, caster if rays else None)
     return result
 
@@ -207,9 +210,7 @@ def seen_by_rays(bake: "BakeFolder", rays: int, seed: int = 0) -> tuple[np.ndarr
     return found
 
 
-def _cast_all(
-    bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, progress: bool, result: VerifyResult
-) -> None:
+def _cast_all(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, result: VerifyResult) -> None:
     """Cast in batches on two threads; judge candidates in order; stop at the first wrong-hidden."""
     sources, rows = caster.sources, len(caster.sources)
     total = -(-rays // rows)
@@ -220,8 +221,7 @@ def _cast_all(
         return
     result.seconds["compile"] = time.perf_counter() - start
     blocks, done, spent = _blocks(rows, total), 1, 0.0
-    bar = tqdm(total=rows * total, initial=rows, unit="ray", unit_scale=True, disable=not progress)
-    with ThreadPoolExecutor(THREADS) as pool, bar:
+    with ThreadPoolExecutor(THREADS) as pool, phase("rays", rows * total, "ray") as bar:
         for block in blocks:
             start, first = time.perf_counter(), done
             for (_, run), found in zip(block, pool.map(lambda batch: caster.cast(*batch), block), strict=True):
@@ -252,7 +252,7 @@ def _blocks(rows: int, total: int) -> list[list[tuple[int, int]]]:
     return [batches[place : place + size] for place in range(0, len(batches), size)]
 
 
-def _hunt(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, progress: bool, result: VerifyResult) -> None:
+def _hunt(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, result: VerifyResult) -> None:
     """Rays that look where an omission is likeliest, and random ones that bound what is missed."""
     start, sources = time.perf_counter(), caster.sources
     falsifier = Falsifier(
@@ -267,9 +267,9 @@ def _hunt(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, progress:
         cells=(bake.graph.cells, bake.potential_cells[sources]) if bake.claims_cells else None,
         seed=caster.seed,
     )
-    with tqdm(total=rays, unit="ray", unit_scale=True, desc="guided", disable=not progress) as bar:
+    with phase("guided rays", rays, "ray") as bar:
         for found, state in falsifier.batches(rays):
-            bar.update(state.rays - bar.n)
+            bar.reach(state.rays)
             result.guided_rays = state.rays
             if _judge_batch(bake, sources, judge, found, result):
                 break
@@ -301,14 +301,14 @@ def _judge_batch(
     return False
 
 
-def _confirm_all(bake: "BakeFolder", judge: Judge, progress: bool, result: VerifyResult) -> None:
+def _confirm_all(bake: "BakeFolder", judge: Judge, result: VerifyResult) -> None:
     """Confirm every stored witness, a chunk of rows at a time."""
     tables = [("cell", "reached_cell_id", bake.cell_to_cell, result.cell_witnesses)]
     if judge.lines is not None:
         tables.append(("object", "object_id", bake.cell_to_object, result.object_witnesses))
     for kind, target, table, outcome in tables:
         rows = visible_rows(table)
-        for first in tqdm(range(0, len(rows), CHUNK), desc=f"{kind} witnesses", disable=not progress):
+        for first in track(range(0, len(rows), CHUNK), f"{kind} witnesses", "chunk"):
             part = read_witnesses(rows.slice(first, CHUNK), target, bake.grid_m)
             if kind == "cell":
                 reasons = confirm_cells(part, bake.graph, judge.lines)

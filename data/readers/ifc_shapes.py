@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..progress import phase
+
 # Of these identifiers the first that a product has is its body, all of that name together; then any unknown one.
 BODIES = ("body", "body-fallback", "facetation", "surface")
 NO_BODIES = frozenset(
@@ -126,11 +128,13 @@ def shapes_of(ifc: object, **selection: list) -> dict[int, Shape]:
         return {}
     iterator = ifcopenshell.geom.iterator(_settings(), ifc, os.cpu_count() or 1, **selection)
     found = defaultdict(list)
-    more = iterator.initialize()
-    while more:
-        piece = iterator.get()
-        found[piece.id].append(piece)
-        more = iterator.next()
+    with phase("geometry", 100, "%") as bar:
+        more = iterator.initialize()
+        while more:
+            piece = iterator.get()
+            found[piece.id].append(piece)
+            more = iterator.next()
+            bar.reach(iterator.progress())
     return {number: _shape(found[number]) for number in sorted(found)}
 
 

@@ -40,7 +40,13 @@ class ViewCells:
 
 
 def write_view_cells(boxes: np.ndarray, scene: Scene, path: str | Path) -> None:
-    """Boxes [grid steps], shape (n, 2, 3), as a table in the model's own metres, which `read_view_cells` gives back."""
+    """Boxes [grid steps], shape (n, 2, 3), as a table in the model's own metres, which `read_view_cells` gives back.
+
+    Raises:
+        InputError: the scene is a model that was turned back, in whose own frame these are no boxes.
+    """
+    if scene.yaw_deg:
+        raise InputError(f"{path}: expected a model along its own axes, found one turned by {scene.yaw_deg:g} degrees")
     rows = boxes.reshape(-1, 6) * scene.grid_m + np.tile(scene.origin, 2)
     lines = [",".join(f"{value:.10f}" for value in row) for row in rows]
     Path(path).write_text("\n".join(["min_x,min_y,min_z,max_x,max_y,max_z", *lines]) + "\n", encoding="utf-8")

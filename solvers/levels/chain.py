@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
-from tqdm import tqdm
 
 from ...data.lod import simplified, watertight, welded
+from ...data.progress import track
 from ...data.scene import Definition, Mesh, Scene
 from ...kernels import deviation
 from ...kernels.deviation import launch_deviation
@@ -97,13 +97,12 @@ def _best(finest: Mesh, surface: np.ndarray, count: int, closed: bool, device: D
     return best
 
 
-def with_lods(scene: Scene, *, device: Device = CPU, progress: bool = False) -> tuple[Scene, list[dict[str, str]]]:
+def with_lods(scene: Scene, *, device: Device = CPU) -> tuple[Scene, list[dict[str, str]]]:
     """A scene whose definitions of a single level have chains of them; level 0 stays as it was.
 
     Args:
         scene: definitions that have several levels already keep those.
         device: where to measure deviations; on as many definitions at a time as it has threads.
-        progress: show a progress bar.
 
     Returns:
         The scene, and what could not be promised, as {"what": definition, "why": reason}.
@@ -121,7 +120,7 @@ def with_lods(scene: Scene, *, device: Device = CPU, progress: bool = False) -> 
     single = [i for i, shape in enumerate(scene.definitions) if len(shape.lods) == 1]
     with ThreadPoolExecutor(device.threads) as pool:
         made = pool.map(build, single)
-        chains = list(tqdm(made, total=len(single), unit="shape", desc="levels of detail", disable=not progress))
+        chains = list(track(made, "levels of detail", "shape", len(single)))
     definitions, notes = list(scene.definitions), []
     for number, chain in zip(single, chains, strict=True):
         name = scene.definitions[number].name

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from tqdm import tqdm
 
 from ...data.errors import InputError
+from ...data.progress import Phase
 from ...data.store.blocks import read_block, write_block
 from ...data.view_cells import as_graph, octants, walkable
 from .cells import Sources
@@ -92,14 +92,14 @@ class Work:
     Attributes:
         engine: that computes them.
         store: of finished ones.
-        bar: of progress, in cells.
+        bar: how far it is, in cells.
         deadline: when no more is begun, of `time.perf_counter`.
         started: when it began, likewise.
     """
 
     engine: "Engine"
     store: Store
-    bar: tqdm
+    bar: Phase
     deadline: float = np.inf
     started: float = 0.0
 
@@ -202,8 +202,7 @@ def refine(
         parents = np.flatnonzero(coarse)
         work.engine = engine.from_cells(families[alive].astype(np.int32))
         fresh, count, rate = [], 0, _Rate()
-        work.bar.total += int(alive.sum())
-        work.bar.refresh()
+        work.bar.grow(int(alive.sum()))
         for number, size in enumerate(alive.sum(axis=1)):
             if not rate.fits(1, work.deadline):
                 # What is left of this level stays as it is: unrefined, never hidden.

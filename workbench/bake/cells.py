@@ -120,6 +120,7 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
         raise InputError(f"refine-kept: expected portal cells, found {cells}; --refine-gap refines an octree")
     if method == "auto":
         method = "occluders"
+    clock.show("view cells")
     # With certificates nothing is hidden by portals alone: the model is what a proof is checked against.
     wanted = method in ("portals", "both") and not settings.certify
     portal_graph = build_graph(model, settings, clock)[0] if wanted else None
@@ -180,6 +181,7 @@ def build_graph(model: PreparedModel, settings: Settings, clock: Clock) -> tuple
     """Cells, portals and inhabitable cells of a model, and what the manifest says of them."""
     scene, opaque = model.scene, model.planes
     clock.lap("read")
+    clock.show("subdivide")
     margin = round(MARGIN_M / scene.grid_m)
     # The grid's own limit is where the kernels stop being exact.
     low, high = np.clip(scene.bounds() + np.array([[-margin], [margin]]), -GRID_LIMIT, GRID_LIMIT)
@@ -189,6 +191,7 @@ def build_graph(model: PreparedModel, settings: Settings, clock: Clock) -> tuple
     cells = cut_rooms(merge(leaves, opaque), boxes)
     dead = dead_cells(cells, model.closed_of(Role.OCCLUDER))
     clock.lap("subdivide")
+    clock.show("portals")
     graph = find_portals(cells[~dead], opaque)
     inhabited = find_inhabitable(scene, graph)
     graph.inhabitable, graph.cell_names = inhabited.mask, inhabited.names

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...data.graph import CellGraph
+from ...data.progress import Phase, begin
 from ...data.rows import Rows
 from ...data.scene import Scene
 from ...data.store.scene_folder import FORMAT, PLAN_FORMAT
@@ -18,16 +19,43 @@ from .settings import Settings
 
 @dataclass
 class Clock:
-    """Seconds by phase."""
+    """Seconds by phase, and who watches told of each.
+
+    Attributes:
+        seconds: by name of the phase.
+        started: when the phase began that goes on, of `time.perf_counter`.
+        shown: that phase as it is shown.
+    """
 
     seconds: dict[str, float] = field(default_factory=dict)
     started: float = field(default_factory=time.perf_counter)
+    shown: Phase | None = None
+
+    def __enter__(self) -> "Clock":
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End what is shown, however the work has ended."""
+        self._hide()
 
     def lap(self, phase: str) -> None:
-        """Add the time since the last lap to a phase."""
+        """Add the time since the last lap to a phase, and show it no more."""
         now = time.perf_counter()
         self.seconds[phase] = round(self.seconds.get(phase, 0.0) + now - self.started, 3)
         self.started = now
+        self._hide()
+
+    def show(self, phase: str, total: float | None = None, unit: str = "") -> Phase:
+        """Show that a phase goes on from here; units as of `Phase`."""
+        self._hide()
+        self.shown = begin(phase, total, unit)
+        return self.shown
+
+    def _hide(self) -> None:
+        if self.shown is not None:
+            self.shown.end()
+            self.shown = None
 
 
 def fingerprint(scene: Scene | None, graph_folder: Path | None, settings: Settings, block_sizes: tuple) -> str:

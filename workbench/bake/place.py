@@ -1,11 +1,16 @@
 """The place that a bake is written to: what may be replaced there, what is unfinished, and what becomes stale."""
 
+import contextlib
+import glob
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator
 from dataclasses import asdict
 from itertools import chain, count
 from pathlib import Path
+
+from filelock import FileLock, Timeout
 
 from ...data.errors import InputError
 from ...data.store.scene_folder import OLD, WRITING, held_manifest, refuse_others
@@ -67,13 +72,34 @@ def set_aside(report: Path) -> None:
         report.rename(next(place for name in names if not (place := report.with_name(name)).exists()))
 
 
-def leftovers(folder: Path, name: str = "*") -> list[Path]:
+@contextlib.contextmanager
+def alone(out: Path) -> Iterator[None]:
+    """No other bake of this machine writes to a place meanwhile.
+
+    Raises:
+        InputError: another one does.
+    """
+    lock = FileLock(out.absolute().with_name(f".{out.name}.lock"), blocking=False)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise InputError(f"{out}: expected no bake that is being written there, found one; wait for it") from None
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            os.unlink(lock.lock_file)
+        lock.release()
+
+
+def leftovers(folder: Path, name: str | None = None) -> list[Path]:
     """Unfinished work of bakes, and folders that were being written when a command was killed, in a folder.
 
     Args:
         folder: where bakes are.
         name: of the bake; of all by default.
     """
+    name = "*" if name is None else glob.escape(name)
     found = [*folder.glob(f".{name}.*{PARTIAL}"), *folder.glob(f".{name}{WRITING}*")]
     return sorted(path for path in found if path.is_dir())
 

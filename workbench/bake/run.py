@@ -2,18 +2,18 @@
 
 import shutil
 import time
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 import pyarrow as pa
-from tqdm import tqdm
 
 from ...data.errors import InputError
 from ...data.graph import CellGraph
 from ...data.lod import object_errors, split_components
 from ...data.prepared import PreparedModel
+from ...data.progress import shown
 from ...data.rooms import join_rooms
 from ...data.rows import Rows
 from ...data.scene import Scene
@@ -27,13 +27,17 @@ from . import blocks
 from .blocks import Shortfall, Store, Work, in_blocks, partial_folder, refine
 from .cells import Sources, bare_sources, model_sources
 from .manifest import Clock, bake_manifest, fingerprint, rewrite_manifest
-from .place import check_place, occupied, set_aside
+from .place import alone, check_place, occupied, set_aside
 from .settings import LevelSettings, Settings, SettingsWords, check_number, with_words
 from .worth import worth
 
 if TYPE_CHECKING:
     from ...kernels.launch import Device
     from ...solvers.visibility.engine import Engine
+
+
+class Interrupted(KeyboardInterrupt):
+    """A bake was interrupted, and the same one goes on from what it has finished."""
 
 
 @dataclass
@@ -44,7 +48,6 @@ class _Run:
         out: folder to write.
         device: where kernels run.
         budget_s: seconds that visibility may take, or None.
-        progress: show bars.
         known: fingerprint of the answer.
         clock: seconds by phase.
     """
@@ -52,9 +55,8 @@ class _Run:
     out: Path
     device: "Device"
     budget_s: float | None
-    progress: bool
     known: str
-    clock: Clock = field(default_factory=Clock)
+    clock: Clock
 
 
 def bake(
@@ -82,7 +84,7 @@ def bake(
         device: Warp device. The answer does not depend on it.
         overwrite: replace a bake at `out`, whatever it is of. Else one of the same model and settings is taken as it
             is, and any other is left alone. Files of others in that folder stay either way.
-        progress: show a progress bar.
+        progress: show how far it is on stderr.
         tuned: what `viewcell tune` has found for those who walk through the bake, by name; stored in the manifest.
         words: settings by name, such as `doors="closed"`, in place of those in `settings`.
 
@@ -90,8 +92,9 @@ def bake(
         The bake. Absent rows are hidden, exactly; `unknown` rows are kept.
 
     Raises:
-        InputError: the model, the settings or the place to write are unusable, or another bake is there; nothing is
-            written or lost.
+        InputError: the model, the settings or the place to write are unusable, or another bake is there, or is being
+            written there; nothing is written or lost.
+        Interrupted: Ctrl-C, when baking again goes on from finished blocks.
     """
     settings = with_words(settings, words)
     settings.check()
@@ -101,20 +104,27 @@ def bake(
 
     where = Device.wanted(device, threads)
     out = Path(out) if out is not None else default_out(model)
-    clock = Clock()
     check_place(out, settings, overwrite)
+    with shown(progress), Clock() as clock, alone(out):
+        return _bake(model, settings, overwrite, tuned or {}, _Run(out, where, budget_s, "", clock))
+
+
+def _bake(model: Scene | str | Path, settings: Settings, overwrite: bool, tuned: dict[str, dict], run: _Run) -> Bake:
+    """As `bake`, of checked settings into a place that may be written; finds the fingerprint of `run` first."""
+    out, clock = run.out, run.clock
+    clock.show("read")
     scene, graph_folder = _open(model, settings)
     known = fingerprint(scene, graph_folder, settings, (blocks.BLOCK, blocks.VIEW_BLOCK))
     if not overwrite and (done := held_manifest(out, "bake")) is not None:
         if done.get("fingerprint") != known:
             raise occupied(out, done, settings)
         if not done.get("budget_spent"):
-            if any(done.get(name) != part for name, part in (tuned or {}).items()):
+            if any(done.get(name) != part for name, part in tuned.items()):
                 # The tables do not depend on what has been tuned.
                 done |= tuned
                 rewrite_manifest(out, done)
             return Bake(out, done)
-    run = _Run(out, where, budget_s, progress, known, clock)
+    run = replace(run, known=known)
     notes = {}
     if scene is None:
         sources = bare_sources(graph_folder, settings, clock)
@@ -124,7 +134,12 @@ def bake(
     sources.facts |= notes
     if not sources.graph.inhabitable.any():
         raise InputError(f"{sources.facts['source']}: expected at least one inhabitable cell, found none")
-    return _write(sources, settings, run, tuned or {})
+    try:
+        return _write(sources, settings, run, tuned)
+    except KeyboardInterrupt:
+        if any(partial_folder(out, known).glob("*.arrow")):
+            raise Interrupted from None
+        raise
 
 
 def _open(model: Scene | str | Path, settings: Settings) -> tuple[Scene | None, Path | None]:
@@ -162,7 +177,7 @@ def _detailed(scene: Scene, settings: Settings, run: _Run) -> tuple[Scene, dict]
     if settings.lods:
         from ...solvers.levels.chain import with_lods
 
-        scene, notes["lod_notes"] = with_lods(scene, device=run.device, progress=run.progress)
+        scene, notes["lod_notes"] = with_lods(scene, device=run.device)
     run.clock.lap("levels of detail")
     return scene, notes
 
@@ -176,12 +191,15 @@ def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dic
         facts["budget"] = {"budget_s": run.budget_s, **asdict(short)}
     scene = None if sources.model is None else sources.model.scene
     if sources.closed is not None:
+        clock.show("leaks")
         extra |= _leaks(sources, (cell_rows, object_rows), settings, run)
         clock.lap("leaks")
     if sources.model is not None and short is None:
+        clock.show("back faces")
         facts["counts"] = facts["counts"] | _triangle_counts(sources.model, graph, object_rows, run.device)
         clock.lap("back faces")
     pairs = object_rows.source, object_rows.target
+    clock.show("eyes")
     facts |= worth(sources.model, graph, pairs, facts, settings.seed)
     clock.lap("eyes")
     if scene is not None and settings.lods:
@@ -193,6 +211,7 @@ def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dic
         rooms = join_rooms(scene, graph, sources.model.room_points, **of_cells)
         extra |= room_tables(scene.spaces, rooms, (cell_rows, object_rows))
         clock.lap("rooms")
+    clock.show("write")
 
     def manifest() -> dict:
         return bake_manifest(facts, settings, run.known, graph, (cell_rows, object_rows), clock)
@@ -251,22 +270,23 @@ def _visibility(
     """
     clock = run.clock
     started = time.perf_counter()
+    clock.show("prepare")
     engine = _engine(sources, settings, run.device)
     clock.lap("prepare")
     compiled = time.perf_counter()
+    clock.show("compile")
     engine.compile()
     # Compiling happens once for a machine; preparing is part of every bake.
     started += time.perf_counter() - compiled
     clock.lap("compile")
     cut = in_blocks(sources)
-    total = sum(map(len, cut))
-    with tqdm(total=total, unit="cell", desc="visibility", disable=not run.progress) as bar:
-        deadline = np.inf if run.budget_s is None else started + run.budget_s
-        work = Work(engine, Store(partial_folder(run.out, run.known)), bar, deadline, started)
-        parts, short = work.all_parts(cut)
-        if sources.octree:
-            parts, unrefined = refine(sources, work, parts, settings)
-            short = short or unrefined
+    bar = clock.show("visibility", sum(map(len, cut)), "cell")
+    deadline = np.inf if run.budget_s is None else started + run.budget_s
+    work = Work(engine, Store(partial_folder(run.out, run.known)), bar, deadline, started)
+    parts, short = work.all_parts(cut)
+    if sources.octree:
+        parts, unrefined = refine(sources, work, parts, settings)
+        short = short or unrefined
     clock.lap("flood")
     tables = {}
     if settings.certify:

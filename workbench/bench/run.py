@@ -9,9 +9,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from ...data.errors import InputError
+from ...data.progress import phase, shown
 from ...data.version import __version__
 from ...kernels.launch import Device
 from ..summary import table
@@ -151,9 +150,9 @@ def bench(
     given = graph_cases(Path(graphs), where) if graphs is not None else []
     grows = suite == "full" and not only
     steps = len(work) + len(given) + (growth_steps() if grows else 0)
-    with tqdm(total=steps, desc="bench", disable=not progress) as bar:
+    with shown(progress), phase("bench", steps, "case") as bar:
         for kernel, n in work:
-            bar.set_postfix_str(kernel)
+            bar.note = kernel
             _add(result, [measure(case, where) for case in make_cases(kernel, n, where)])
             bar.update()
         for case in given:

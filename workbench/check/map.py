@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from ...data.errors import InputError
+from ...data.progress import phase, shown
 from ...data.store.claims import read_claims
 from ...data.store.quake import UNIT_STEPS, LeafPortals, axial_graph, check_belongs, is_axial, read_bsp, read_prt
 from ...data.store.view_cells import ViewCells
@@ -107,7 +107,7 @@ def _follow_lines(
     start = time.perf_counter()
     windings = WindingLines(portals)
     judging = 0.0
-    with tqdm(total=each * count, unit="line", unit_scale=True, disable=not progress) as bar:
+    with shown(progress), phase("lines", each * count, "line") as bar:
         for first in range(0, each, ROUND_LINES):
             lines = min(ROUND_LINES, each - first)
             # Five numbers in a row seed a launch.

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from tqdm import tqdm
 
 from ...data.errors import InputError
 from ...data.graph import CellGraph
+from ...data.progress import phase, shown
 from ...data.scene import OPAQUE, Role, Scene
 from ...data.store.claims import Claims, read_claims
 from ...data.store.room_tables import read_room_table, words_of_cells
@@ -101,7 +101,8 @@ def check(
     rooms = read_room_table(Path(cells), "rooms") if baked else None
     hunt.result.cell_rooms = words_of_cells(rooms, view.graph.cell_names)
     hunt.result.seconds["read"] = time.perf_counter() - start
-    hunt.run(progress)
+    with shown(progress):
+        hunt.run()
     path = None if isinstance(model, Scene) else str(Path(model).resolve())
     hunt.result.asked = {"model": path, "judge": "triangles", "reading": reading}
     return hunt.result
@@ -261,7 +262,7 @@ class _Hunt:
         # Pairs that no suspect is wanted of: claimed, or found wrong already.
         self.settled = {kind: matrix.copy() for kind, matrix in claimed.items()}
 
-    def run(self, progress: bool) -> None:
+    def run(self) -> None:
         """Hunt, look again for what was not seen, and measure what was found."""
         sources, claimed = self.result.sources, self.result.claimed
         start = time.perf_counter()
@@ -278,22 +279,22 @@ class _Hunt:
             seed=self.seed,
         )
         self.result.seconds["prepare"] = time.perf_counter() - start
-        self.hunt(falsifier, progress)
+        self.hunt(falsifier)
         self.look_again(falsifier)
         start = time.perf_counter()
         self.measure()
         self.result.seconds["measure"] = time.perf_counter() - start
 
-    def hunt(self, falsifier: Falsifier, progress: bool) -> None:
+    def hunt(self, falsifier: Falsifier) -> None:
         """Rays that look for wrong-hidden pairs; the exact judge has the last word on each."""
         start, judged = time.perf_counter(), self.result.seconds.get("adjudicate", 0.0)
-        with tqdm(total=self.rays, unit="ray", unit_scale=True, disable=not progress) as bar:
+        with phase("rays", self.rays, "ray") as bar:
             for suspects, state in falsifier.batches(self.rays):
                 self.judge_suspects(suspects)
-                bar.update(state.rays - bar.n)
+                bar.reach(state.rays)
                 if state.uniform_rays.min(initial=1):
                     largest = Confidence(state.uniform_rays).holes_sr.max()
-                    bar.set_postfix_str(f"{len(self.result.wrong)} wrong-hidden, holes below {largest:.2g} sr")
+                    bar.note = f"{len(self.result.wrong)} wrong-hidden, holes below {largest:.2g} sr"
                 self.result.rays = state.rays
         self.result.uniform = falsifier.uniform_rays
         if not self.result.rays:

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from tqdm import tqdm
 
 from ...data.errors import InputError
+from ...data.progress import phase, shown
 from ...data.store.view_cells import write_view_cells
 from ...verify.rays.witness import visible_rows, witnessed_objects
 from ..bake.run import bake
@@ -68,7 +68,7 @@ def sweep(bake_: "BakeFolder", *, cells: int = 8, seed: int = 0, progress: bool 
     sources = np.flatnonzero(bake_.graph.inhabitable)
     if not len(sources) or cells < 1:
         raise InputError(f"{bake_.folder}: expected view cells to sweep over, found none")
-    with tempfile.TemporaryDirectory() as name, tqdm(desc="curves", unit="run", disable=not progress) as bar:
+    with tempfile.TemporaryDirectory() as name, shown(progress), phase("curves") as bar:
         if bake_.manifest["counts"]["objects"]:
             chosen = np.sort(np.random.default_rng(seed).permutation(sources)[:cells])
             sweeper = _Sweeper(bake_, chosen, Path(name), seed)
@@ -80,7 +80,8 @@ def sweep(bake_: "BakeFolder", *, cells: int = 8, seed: int = 0, progress: bool 
         found = []
         for run in runs:
             found.append(run)
-            bar.update()
+            bar.note = f"{len(found)} runs"
+            bar.beat()
     truth = np.logical_or.reduce([run.seen for run in found if not run.apart])
     series: dict[tuple[str, str], Series] = {}
     for run in found:

@@ -12,9 +12,9 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from ...data.errors import InputError
+from ...data.progress import shown, track
 from ...data.scene import GRID_LIMIT, GRID_M
 from ...data.verdict import Verdict
 from ...kernels.launch import Device
@@ -81,12 +81,13 @@ def measure_stability(
     where = Device.wanted(device, 1)
     rows: list[Row] = []
     sweeps = list(_sweeps(cases or CASES, seed))
-    for knob, value, hard in tqdm(sweeps, desc="stability", unit="value", disable=not progress):
-        kernels = [*(["launch_stab"] if hard.stab else []), *(REGION_KERNELS if hard.region else [])]
-        kernels += ["launch_confirm"] if hard.sightline else []
-        rows += [_row(knob, value, kernel, hard, where) for kernel in kernels]
-        if hard.sightline:
-            rows.append(_by_float32(knob, value, hard.sightline))
+    with shown(progress):
+        for knob, value, hard in track(sweeps, "stability", "value"):
+            kernels = [*(["launch_stab"] if hard.stab else []), *(REGION_KERNELS if hard.region else [])]
+            kernels += ["launch_confirm"] if hard.sightline else []
+            rows += [_row(knob, value, kernel, hard, where) for kernel in kernels]
+            if hard.sightline:
+                rows.append(_by_float32(knob, value, hard.sightline))
     return rows
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv
-from tqdm import tqdm
 
 from ...data.camera import CameraPath, Screen
 from ...data.errors import InputError
+from ...data.progress import phase, shown
 from ...data.silence import silenced
 from ...data.store.bake_folder import BakeFolder
 from ...data.version import __version__
@@ -141,7 +141,7 @@ def tune_lod(
     problem, notes = _problem(bake, walked, screen, benefit)
     budget_count = len(budgets_ms or SHARES)
     runs = budget_count * (2 * (len(CHOOSERS) - 1) * len(walked) + min(DRAWN_FRAMES, len(walked)))
-    with tqdm(total=SAMPLE_FRAMES + runs, unit="frame", desc="tune lod", disable=not progress) as bar:
+    with shown(progress), phase("levels of detail", SAMPLE_FRAMES + runs, "frame") as bar:
         renderer, measured = None, None
         if cost is None:
             renderer = SoftwareRenderer(bake.scene, problem.tuples, problem.sightings, screen)

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from tqdm import tqdm
 
 from ...data.errors import InputError
 from ...data.prepared import PreparedModel
+from ...data.progress import phase, shown
 from ...verify.rays.witness import witnessed_objects
 from .candidates import Candidate, default_out, front_of, write_tune
 
@@ -112,14 +112,13 @@ def tune_projection_point(
     ]
     plan += [(VlodSettings(26, "socp", resolution, seed=seed), "") for resolution in RESOLUTIONS]
     candidates = []
-    bar = tqdm(total=len(plan) + 1, desc="projection points", unit="setting", disable=not progress)
-    bench.warm(plan[0][0])
-    for settings, solver in plan:
-        candidates.append(bench.run(settings, solver))
+    with shown(progress), phase("projection points", len(plan) + 1, "setting") as bar:
+        bench.warm(plan[0][0])
+        for settings, solver in plan:
+            candidates.append(bench.run(settings, solver))
+            bar.update()
+        solvers = bench.solvers()
         bar.update()
-    solvers = bench.solvers()
-    bar.update()
-    bar.close()
     recommended = recommend([c for c in candidates if c.settings])
     wrong = sum(int(c.numbers["wrong hidden"]) for c in candidates)
     folder = Path(out) if out else default_out(bake)
