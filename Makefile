@@ -11,6 +11,9 @@ install: .venv/installed
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	# Type checkers and editors do not run the finder of an editable install: they follow a path to `viewcell`.
+	mkdir -p .venv/src && ln -sfn "$(CURDIR)" .venv/src/viewcell
+	echo "$(CURDIR)/.venv/src" > "$$($(BIN)/python -c 'import site; print(site.getsitepackages()[0])')/viewcell_source.pth"
 	touch $@
 
 run: install

@@ -12,6 +12,7 @@ from ...data.carving import find_faces
 from ...data.errors import InputError
 from ...data.prepared import PreparedModel
 from ...data.scene import OPAQUE
+from ...data.store.bake_folder import read_bake
 from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses, visible_rows
 from ..bake.worth import told_worth
@@ -37,7 +38,7 @@ COUNTED = ("cells", "inhabitable cells", "portals", "objects", "opaque triangles
 
 
 def report(
-    bake: "BakeFolder",
+    bake: "BakeFolder | str | Path",
     *,
     cells: "Sequence[int] | None" = None,
     out: str | Path | None = None,
@@ -46,7 +47,7 @@ def report(
     """Write report.md and its pictures, and report.html, which shows every cell and needs no other file.
 
     Args:
-        bake: the bake.
+        bake: the bake, or its folder.
         cells: cells whose potentially visible sets are shown; by default three inhabitable ones: the median set, the
             worst overestimate and the largest set.
         out: folder to write, made if need be; by default `report` inside the bake folder.
@@ -58,6 +59,7 @@ def report(
     Raises:
         InputError: a cell does not exist or is not inhabitable, the curves are none, or the folder cannot be written.
     """
+    bake = read_bake(bake) if isinstance(bake, str | Path) else bake
     chosen = choose_cells(bake) if cells is None else {int(cell): "chosen" for cell in cells}
     for cell in chosen:
         if not (0 <= cell < bake.graph.cell_count and bake.graph.inhabitable[cell]):
