@@ -28,6 +28,7 @@ from itertools import combinations
 import numpy as np
 
 from ..data.errors import InputError
+from ..data.extras import need
 from ..kernels.shrink import LEAST_HEIGHT, launch_shrink
 from ..kernels.umbra import USABLE, Umbras
 from .result import Result, Status
@@ -313,6 +314,7 @@ def _solve_batch(problems: list[Problem], size: int, rows: np.ndarray, result: R
     for i, p in enumerate(batch):
         a[i, : len(p.rows)] = p.rows
         c[i, : len(p.rows)] = parts[i][2]
+    need("jax")
     import jax
 
     with jax.enable_x64(True):
@@ -331,6 +333,7 @@ def _solve_batch(problems: list[Problem], size: int, rows: np.ndarray, result: R
 @cache
 def _interior_point() -> Callable:
     """Mehrotra's predictor-corrector method for min v H v / 2 + q v, A v >= c, on a batch; compiled on first use."""
+    need("jax")
     import jax
     import jax.numpy as jnp
 

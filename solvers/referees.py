@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..data.extras import need
 from .projection_point import Problem, in_front
 from .result import Result, Status
 
@@ -23,6 +24,7 @@ def cone_point(problem: Problem) -> Result:
     Args:
         problem: a quadratic one, with at least one occluder.
     """
+    need("clarabel")
     import clarabel
     from scipy import sparse
 
@@ -62,6 +64,7 @@ def gradient_point(problem: Problem, *, tolerance: float = 1e-12) -> Result:
         problem: with at least one occluder.
         tolerance: on the step, relative, at which it stops.
     """
+    need("nlopt")
     import nlopt
 
     begin = time.perf_counter()
@@ -154,6 +157,7 @@ def searched_point(
         evaluations: of the score, for each start.
         seed: of the random points.
     """
+    need("nlopt")
     import nlopt
 
     begin = time.perf_counter()

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 from ..data.errors import InputError
+from ..data.extras import missing
 from ..data.version import __version__
 from .terminal import INTERRUPTED, UNUSABLE, complain, watched
 
@@ -39,6 +40,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except InputError as error:
         complain(str(error))
+    except ModuleNotFoundError as error:
+        told = missing(error)
+        if told is error:
+            raise
+        complain(str(told))
     except MemoryError as error:
         complain(f"expected enough memory, found too little{f' ({error})' if str(error) else ''}")
     except RuntimeError as error:

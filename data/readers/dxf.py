@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..extras import need
 from .assemble import Model
 from .pieces import MeshFile, Piece, bent_note, contents
 from .roles import OPAQUE_ALPHA
@@ -129,6 +130,7 @@ def _open(path: Path):
     Raises:
         InputError: ezdxf cannot read it, or it does not come to its end.
     """
+    need("ezdxf")
     import ezdxf
 
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # what it complains of is no use without the drawing

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..extras import need
 from .assemble import Model
 from .gltf_buffers import Gltf, extensions
 from .pieces import MeshFile, Piece, one_colour, rgba
@@ -282,6 +283,7 @@ class _Shown:
         Raises:
             InputError: they cannot be unpacked.
         """
+        need("DracoPy")
         import DracoPy
 
         data, _ = self.gltf.view(extensions(primitive)[DRACO]["bufferView"])

@@ -10,6 +10,7 @@ from collections import Counter, defaultdict
 from pathlib import Path
 
 from ..errors import InputError
+from ..extras import need
 from ..scene import LOST_ROOM, Scene, Space
 from .archive import only_file
 from .assemble import Model, Part, assemble
@@ -53,6 +54,7 @@ def read_ifc(path: Path, model: Model, roles: RoleRules) -> Scene:
 
 
 def _open(path: Path) -> object:
+    need("ifcopenshell")
     import ifcopenshell
 
     content = _content(path)

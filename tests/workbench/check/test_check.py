@@ -428,14 +428,33 @@ def test_plugin(tmp_path, house, claims):
     (tmp_path / "test_mine.py").write_text(
         "import pytest\n\n"
         "@pytest.mark.parametrize('sets', ['pvs.csv', 'cut.csv'])\n"
-        "def test_pvs(scene, assert_conservative, sets):\n"
-        f"    assert_conservative(sets, scene, cells='cells.parquet', rays={RAYS})\n"
+        "def test_pvs(viewcell_scene, assert_conservative, sets):\n"
+        f"    assert_conservative(sets, viewcell_scene, cells='cells.parquet', rays={RAYS})\n"
     )
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = run_pytest(tmp_path)
     assert done.returncode == 1 and "1 failed, 1 passed" in done.stdout, done.stdout + done.stderr
     assert "FAILED test_mine.py::test_pvs[cut.csv]" in done.stdout
     assert "not conservative: 1 visible pair claimed hidden" in done.stdout and "sees object" in done.stdout
+
+
+def run_pytest(folder):
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_the_plugin_takes_no_name_that_is_not_its_own(tmp_path):
+    """A fixture `scene` only where it is asked for; a missing model is one line."""
+    asks = "def test_mine(scene):\n    assert len(scene.objects)\n"
+    (tmp_path / "test_mine.py").write_text(asks)
+    assert "fixture 'scene' not found" in run_pytest(tmp_path).stdout
+    (tmp_path / "pytest.ini").write_text("[pytest]\nviewcell_names = short\n")
+    assert "1 passed" in run_pytest(tmp_path).stdout
+    (tmp_path / "pytest.ini").write_text("[pytest]\nviewcell_names = short\nviewcell_model = none.ifc\n")
+    told = run_pytest(tmp_path).stdout
+    assert "none.ifc: expected a model file or folder, found nothing there" in told and "Traceback" not in told
+    assert sum("none.ifc" in line for line in told.splitlines()) <= 2 and "pytest_plugin.py" not in told
+    (tmp_path / "pytest.ini").write_text("[pytest]\nviewcell_names = shorter\n")
+    assert "viewcell_names: expected long or short, found 'shorter'" in run_pytest(tmp_path).stderr
 
 
 def test_a_bake_of_prisms_alone_stands_by_its_claims_of_objects(tmp_path):

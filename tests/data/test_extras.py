@@ -1,0 +1,43 @@
+"""What is said where a package of an extra is missing."""
+
+import sys
+import tomllib
+
+import pytest
+from builders.places import ROOT
+from viewcell.data.errors import InputError
+from viewcell.data.extras import EXTRAS, missing, need
+from viewcell.workbench.cli import main
+
+
+def test_every_package_is_in_its_extra():
+    """And `all` has every extra but those of developers."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    for package, extra in EXTRAS.items():
+        assert any(line.lower().startswith(package.lower()) for line in extras[extra]), package
+        assert not any(line.lower().startswith(package.lower()) for line in project["dependencies"]), package
+    (everything,) = extras["all"]
+    assert set(EXTRAS.values()) <= set(everything.partition("[")[2].rstrip("]").split(","))
+
+
+@pytest.mark.parametrize(("package", "file"), [("ifcopenshell", "a.ifc"), ("ezdxf", "a.dxf")])
+def test_a_reader_without_its_package_is_one_line(package, file, tmp_path, monkeypatch, capsys):
+    (tmp_path / file).write_text("ISO-10303-21;")
+    monkeypatch.setitem(sys.modules, package, None)
+    assert main(["inspect", str(tmp_path / file)]) == 2
+    told = capsys.readouterr().err
+    assert (
+        told
+        == f"viewcell: expected the package {package}, found none; pip install 'viewcell[{EXTRAS[package]}]' brings it\n"
+    )
+
+
+def test_what_no_extra_brings_is_a_fault_of_ours(monkeypatch):
+    monkeypatch.setitem(sys.modules, "jax", None)
+    with pytest.raises(InputError, match=r"pip install 'viewcell\[tune\]'"):
+        need("jax")
+    need("numpy")
+    fault = ModuleNotFoundError("no", name="viewcell.data.nothing")
+    assert missing(fault) is fault
+    assert isinstance(missing(ModuleNotFoundError("no", name="jax.numpy")), InputError)
