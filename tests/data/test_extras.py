@@ -26,11 +26,8 @@ def test_a_reader_without_its_package_is_one_line(package, file, tmp_path, monke
     (tmp_path / file).write_text("ISO-10303-21;")
     monkeypatch.setitem(sys.modules, package, None)
     assert main(["inspect", str(tmp_path / file)]) == 2
-    told = capsys.readouterr().err
-    assert (
-        told
-        == f"viewcell: expected the package {package}, found none; pip install 'viewcell[{EXTRAS[package]}]' brings it\n"
-    )
+    wanted = f"expected the package {package}, found none; pip install 'viewcell[{EXTRAS[package]}]' brings it"
+    assert capsys.readouterr().err == f"viewcell: {wanted}\n"
 
 
 def test_what_no_extra_brings_is_a_fault_of_ours(monkeypatch):
