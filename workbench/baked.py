@@ -151,6 +151,25 @@ class Bake(BakeFolder):
 
         return report(self, cells=cells, out=out, curves=curves)
 
+    def export(self, kind: str, out: str | Path, *, overwrite: bool = False) -> Path:
+        """Write it for engines and other tools; docs/guides/export.md says what each kind holds.
+
+        Args:
+            kind: "glb", "json", "bits" or "prt", a file each.
+            out: where to.
+            overwrite: whether what is there may be replaced.
+
+        Returns:
+            Where it is.
+
+        Raises:
+            InputError: there is no such kind, something is there already, it cannot be written, or the bake has
+                nothing of that kind.
+        """
+        from .export.run import export
+
+        return export(self, {kind: out}, overwrite=overwrite)[0]
+
 
 def load(folder: str | Path) -> Bake:
     """Open a bake folder.

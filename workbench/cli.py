@@ -422,11 +422,18 @@ def _add_curves(commands: argparse._SubParsersAction) -> None:
 
 
 def _add_export(commands: argparse._SubParsersAction) -> None:
-    export = _command(commands, "export", "export", "Write a bake's cells and portals for other tools.")
-    export.add_argument("bake", metavar="BAKE", help="bake folder with portals")
-    export.add_argument(
-        "--prt", metavar="FILE", required=True, help="portal file PRT1 for a Quake-family vis, cells as leaves in order"
+    export = _command(
+        commands, "export", "export", "Write a bake's model, sets or portals for engines and other tools."
     )
+    export.add_argument("bake", metavar="BAKE", help="bake folder")
+    for kind, text in (
+        ("glb", "the model: a node for each object, with its id and GUID in extras"),
+        ("json", "view cells, rooms, objects and potentially visible sets"),
+        ("bits", "the sets as a bit matrix, and viewcell_bits.h beside it, which reads it from C"),
+        ("prt", "portal file PRT1 for a Quake-family vis, cells as leaves in order"),
+    ):
+        export.add_argument(f"--{kind}", metavar="FILE", help=text)
+    export.add_argument("--overwrite", action="store_true", help="replace what is there")
 
 
 def _add_bench(commands: argparse._SubParsersAction) -> None:

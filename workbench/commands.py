@@ -5,9 +5,7 @@ Nothing heavy is imported before it is needed: an argument that is wrong is refu
 
 import argparse
 import json
-import os
 import sys
-import tempfile
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
@@ -355,20 +353,21 @@ def _stability(options: argparse.Namespace) -> int:
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write cells and portals as a portal file and say how to judge what another tool makes of them."""
-    from ..data.store.quake import UNIT_STEPS, write_prt
+    """Write a bake for engines and other tools, and say where everything is."""
     from .baked import load
+    from .export.run import KINDS
+    from .export.run import export as write
 
-    made, out = load(options.bake), Path(options.prt)
-    if not made.graph.portal_count:
-        raise InputError(f"{made.folder}: expected a bake with portals, found none between its cells")
-    try:
-        with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as scratch:
-            write_prt(made.graph, Path(scratch) / "map.prt")
-            os.replace(Path(scratch) / "map.prt", out)
-    except OSError as error:
-        raise InputError(f"{out}: expected a file to write, found {error.strerror}") from None
-    unit = f"1 unit = {UNIT_STEPS * made.grid_m:g} m"
-    say(f"{made.graph.cell_count:,} leaves, {made.graph.portal_count:,} portals, {unit}; written to {out}")
-    say(f"viewcell check {out} --pvs SETS judges the sets that another tool computes for it")
+    asked = {kind: getattr(options, kind) for kind in KINDS if getattr(options, kind) is not None}
+    if not asked:
+        raise InputError(f"export: expected at least one of --{', --'.join(KINDS)}, found none")
+    made = load(options.bake)
+    for out in write(made, asked, overwrite=options.overwrite):
+        say(f"written to {out}, {out.stat().st_size:,} bytes")
+    if "prt" in asked:
+        from ..data.store.quake import UNIT_STEPS
+
+        graph, unit = made.graph, f"1 unit = {UNIT_STEPS * made.grid_m:g} m"
+        say(f"{graph.tile_count:,} leaves, {graph.portal_count:,} portals, {unit}")
+        say(f"viewcell check {options.prt} --pvs SETS judges the sets that another tool computes for it")
     return 0

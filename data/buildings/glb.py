@@ -42,7 +42,7 @@ def write_glb(scene: Scene, path: str | Path) -> None:
     }
     model = trimesh.Scene()
     for object_id, placed in enumerate(scene.objects):
-        material = _material(placed.role, placed.kind)
+        material = material_name(placed.role, placed.kind)
         shape = f"{placed.definition_id} {material}"
         if shape not in model.geometry:
             finest = scene.definitions[placed.definition_id].lods[0]
@@ -61,7 +61,8 @@ def write_glb(scene: Scene, path: str | Path) -> None:
         raise InputError(f"{path}: expected to be able to write there, found {error.strerror}") from None
 
 
-def _material(role: Role, kind: str) -> str:
+def material_name(role: Role, kind: str) -> str:
+    """Which of COLOURS an object gets that has none of its own."""
     if role is Role.TRANSPARENT:
         return "door" if "Door" in kind else "glass"
     return "wall" if role is Role.OCCLUDER else "furniture"

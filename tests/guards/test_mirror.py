@@ -8,7 +8,6 @@ FLOORS = ("data", "kernels", "solvers", "verify", "workbench")
 ELSE = {
     "kernels/test_cuda_compile.py": "every kernel at once",
     "workbench/test_bad_input.py": "every command at once",
-    "workbench/test_export.py": "a command without a file of its own",
     "workbench/bake/test_levels.py": "levels of detail through a whole bake",
     "workbench/report/test_in_browser.py": "the page as a person uses it",
     "workbench/report/test_page_modules.py": "runs the modules' own tests in Node",

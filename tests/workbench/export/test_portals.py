@@ -43,3 +43,9 @@ def test_what_cannot_be_exported_is_told_in_one_line(baked, tmp_path, capsys):
     assert main(["export", str(tmp_path), "--prt", str(tmp_path / "rooms.prt")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not list(tmp_path.glob("*.prt"))
+
+
+def test_prisms_are_no_leaves(house, tmp_path):
+    """They come last, have no portals, and overlap the cells that are leaves."""
+    path = load(house.folder).export("prt", tmp_path / "house.prt")
+    assert read_prt(path).leaf_count == house.graph.tile_count

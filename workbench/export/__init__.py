@@ -1,0 +1,1 @@
+"""Write a bake for engines: its sets, its model, and both together."""
