@@ -155,7 +155,7 @@ class Bake(BakeFolder):
         """Write it for engines and other tools; docs/guides/export.md says what each kind holds.
 
         Args:
-            kind: "glb", "json", "bits" or "prt", a file each.
+            kind: "glb", "json", "bits" or "prt", a file each, or "3dtiles", a folder.
             out: where to.
             overwrite: whether what is there may be replaced.
 

@@ -433,6 +433,11 @@ def _add_export(commands: argparse._SubParsersAction) -> None:
         ("prt", "portal file PRT1 for a Quake-family vis, cells as leaves in order"),
     ):
         export.add_argument(f"--{kind}", metavar="FILE", help=text)
+    export.add_argument(
+        "--3dtiles",
+        metavar="FOLDER",
+        help="a tileset that shows to an eye in a view cell what it may see, and the same as a draft of glTF",
+    )
     export.add_argument("--overwrite", action="store_true", help="replace what is there")
 
 

@@ -363,7 +363,8 @@ def export(options: argparse.Namespace) -> int:
         raise InputError(f"export: expected at least one of --{', --'.join(KINDS)}, found none")
     made = load(options.bake)
     for out in write(made, asked, overwrite=options.overwrite):
-        say(f"written to {out}, {out.stat().st_size:,} bytes")
+        parts = [out] if out.is_file() else [part for part in out.rglob("*") if part.is_file()]
+        say(f"written to {out}, {sum(part.stat().st_size for part in parts):,} bytes")
     if "prt" in asked:
         from ..data.store.quake import UNIT_STEPS
 

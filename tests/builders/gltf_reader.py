@@ -24,12 +24,14 @@ def split(data):
     return json.loads(chunks[b"JSON"]), chunks.get(b"BIN\0", b"")
 
 
-def values(document, binary, number):
+def values(document, buffers, number):
     accessor = document["accessors"][number]
     view = document["bufferViews"][accessor["bufferView"]]
     width, kind = WIDTHS[accessor["type"]], np.dtype(TYPES[accessor["componentType"]])
     assert view["byteOffset"] % 4 == 0 and accessor["count"] * width * kind.itemsize == view["byteLength"]
-    found = np.frombuffer(binary, kind, accessor["count"] * width, view["byteOffset"]).reshape(-1, width)
+    found = np.frombuffer(buffers[view["buffer"]], kind, accessor["count"] * width, view["byteOffset"]).reshape(
+        -1, width
+    )
     if "min" in accessor:
         assert np.array_equal(found.min(axis=0), accessor["min"]) and np.array_equal(found.max(axis=0), accessor["max"])
     return found
@@ -48,18 +50,24 @@ def local(node):
 
 
 def drawn(data):
-    """(node, triangles (n, 3, 3) [m], base colour of each (n, 4)) of each node that stands for an object."""
+    """What each node of a GLB draws; see `drawn_by`."""
     document, binary = split(data)
+    return drawn_by(document, [binary])
+
+
+def drawn_by(document, buffers):
+    """(node, triangles (n, 3, 3) [m], base colour of each (n, 4)) of each node that stands for an object."""
     out = []
+    assert [entry["byteLength"] for entry in document.get("buffers", [])] == [len(data) for data in buffers if data]
 
     def visit(number, above):
         node = document["nodes"][number]
         matrix = above @ local(node)
         triangles, colours = [np.zeros((0, 3, 3))], [np.zeros((0, 4))]
         for part in document["meshes"][node["mesh"]]["primitives"] if "mesh" in node else []:
-            points = values(document, binary, part["attributes"]["POSITION"]).astype(float)
+            points = values(document, buffers, part["attributes"]["POSITION"]).astype(float)
             corners = (points @ matrix[:3, :3].T + matrix[:3, 3]) @ UPRIGHT.T
-            triangles.append(corners[values(document, binary, part["indices"]).ravel()].reshape(-1, 3, 3))
+            triangles.append(corners[values(document, buffers, part["indices"]).ravel()].reshape(-1, 3, 3))
             colour = document["materials"][part["material"]]["pbrMetallicRoughness"]["baseColorFactor"]
             colours.append(np.repeat([colour], len(triangles[-1]), axis=0))
         if "id" in node.get("extras", {}):

@@ -43,31 +43,62 @@ def objects_as_glb(scene: Scene, object_ids: Sequence[int], place: np.ndarray) -
         object_ids: of what is to be in the file, at least one.
         place: what moves the scene's frame to where the file is to be, Z up, shape (4, 4), float64.
     """
-    return _Writer(scene).write(object_ids, place)
+    return _Writer(scene).glb(object_ids, place)
+
+
+def objects_as_gltf(scene: Scene, object_ids: Sequence[int], place: np.ndarray, above: str) -> tuple[dict, dict]:
+    """The same as a JSON document, with each shape in a file of its own that other documents share.
+
+    Args:
+        scene: the model.
+        object_ids: of what is to be in the document, at least one.
+        place: as of `objects_as_glb`.
+        above: what leads from the document to the shapes' files, such as "../".
+
+    Returns:
+        The document, and the files' bytes by name.
+    """
+    writer = _Writer(scene, above)
+    return writer.document(object_ids, place), writer.files
 
 
 class _Writer:
     """A glTF document as it grows: meshes and materials are written when the first object needs them."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, above: str | None = None) -> None:
         self._scene = scene
-        self._binary = bytearray()
+        self._above = above
+        self.files: dict[str, bytearray] = {}
         self._lists: dict[str, list[dict]] = {
             name: [] for name in ("nodes", "meshes", "materials", "accessors", "bufferViews")
         }
         self._materials: dict[tuple, int] = {}
-        self._shapes: dict[object, list[tuple[tuple | None, dict]]] = {}
+        self._shapes: dict[str, list[tuple[tuple | None, dict]]] = {}
         self._meshes: dict[tuple, int | None] = {}
 
-    def write(self, object_ids: Sequence[int], place: np.ndarray) -> bytes:
+    def document(self, object_ids: Sequence[int], place: np.ndarray) -> dict:
         nodes = self._lists["nodes"]
         root = {"name": "viewcell", "children": [], "matrix": _numbers((Z_UP_TO_Y_UP @ place).T)}
-        root["extras"] = {"unit": "metre", "source": self._scene.source}
+        root["extras"] = {"unit": "metre"}
         nodes.append(root)
         for object_id in object_ids:
             root["children"].append(len(nodes))
             nodes.append(self._node(int(object_id)))
-        return self._glb()
+        document = {"asset": {"version": "2.0", "generator": f"viewcell {__version__}"}}
+        document |= {"scene": 0, "scenes": [{"nodes": [0]}]}
+        document |= {name: rows for name, rows in self._lists.items() if rows}
+        if self.files:
+            uris = [{} if self._above is None else {"uri": self._above + name} for name in self.files]
+            document["buffers"] = [u | {"byteLength": len(f)} for u, f in zip(uris, self.files.values(), strict=True)]
+        return document
+
+    def glb(self, object_ids: Sequence[int], place: np.ndarray) -> bytes:
+        text = json.dumps(self.document(object_ids, place), ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+        data = text.encode()
+        chunks = [(b"JSON", data + b" " * (-len(data) % 4))]
+        chunks += [(b"BIN\0", bytes(binary)) for binary in self.files.values()]
+        body = b"".join(CHUNK_HEAD.pack(len(data), kind) + data for kind, data in chunks)
+        return GLB_HEAD.pack(b"glTF", 2, GLB_HEAD.size + len(body)) + body
 
     def _node(self, object_id: int) -> dict:
         placed = self._scene.objects[object_id]
@@ -81,16 +112,16 @@ class _Writer:
         if _skewed(linear):
             # No rotation and scale make this transform, which is all that a node may have: the vertices move instead.
             moved = mesh.vertices @ linear.T + placed.transform[:3, 3]
-            index = self._mesh(("object", object_id), Mesh(moved, mesh.faces, colours=mesh.colours), fallback)
+            index = self._mesh(f"object_{object_id}", Mesh(moved, mesh.faces, colours=mesh.colours), fallback)
         else:
-            index = self._mesh(placed.definition_id, mesh, fallback)
+            index = self._mesh(str(placed.definition_id), mesh, fallback)
             node |= _placement(placed.transform)
         return node if index is None else node | {"mesh": index}
 
-    def _mesh(self, key: object, mesh: Mesh, fallback: tuple) -> int | None:
+    def _mesh(self, key: str, mesh: Mesh, fallback: tuple) -> int | None:
         """A mesh for a shape, and for the colour that it gets where its faces have none; None where it has no faces."""
         if key not in self._shapes:
-            self._shapes[key] = self._primitives(mesh)
+            self._shapes[key] = self._primitives("" if self._above is None else f"shapes/{key}.bin", mesh)
         coloured = all(colour is not None for colour, _ in self._shapes[key])
         name = (key, None if coloured else fallback)
         if name not in self._meshes:
@@ -103,11 +134,11 @@ class _Writer:
                 self._lists["meshes"].append({"primitives": parts})
         return self._meshes[name]
 
-    def _primitives(self, mesh: Mesh) -> list[tuple[tuple | None, dict]]:
-        """Faces by colour, all over the same vertices."""
+    def _primitives(self, file: str, mesh: Mesh) -> list[tuple[tuple | None, dict]]:
+        """Faces by colour, all over the same vertices, in a file."""
         if not len(mesh.faces):
             return []
-        points = self._accessor(np.asarray(mesh.vertices, np.float32), VERTICES, bounds=True)
+        points = self._accessor(file, np.asarray(mesh.vertices, np.float32), VERTICES)
         if mesh.colours is None:
             groups = [(None, mesh.faces)]
         else:
@@ -116,17 +147,17 @@ class _Writer:
         # 65,535 would end a strip.
         kind = np.uint16 if len(mesh.vertices) < 2**16 else np.uint32
         return [
-            (colour, {"attributes": {"POSITION": points}, "indices": self._accessor(faces.astype(kind), INDICES)})
+            (colour, {"attributes": {"POSITION": points}, "indices": self._accessor(file, faces.astype(kind), INDICES)})
             for colour, faces in groups
         ]
 
-    def _accessor(self, values: np.ndarray, target: int, bounds: bool = False) -> int:
-        data = values.tobytes()
-        view = {"buffer": 0, "byteOffset": len(self._binary), "byteLength": len(data), "target": target}
-        self._binary += data + bytes(-len(data) % 4)
+    def _accessor(self, file: str, values: np.ndarray, target: int) -> int:
+        binary, data = self.files.setdefault(file, bytearray()), values.tobytes()
+        view = {"buffer": list(self.files).index(file), "byteOffset": len(binary), "byteLength": len(data)}
+        binary += data + bytes(-len(data) % 4)
         accessor = {"bufferView": len(self._lists["bufferViews"])}
-        self._lists["bufferViews"].append(view)
-        if bounds:
+        self._lists["bufferViews"].append(view | {"target": target})
+        if target == VERTICES:
             accessor |= {"componentType": FLOAT, "count": len(values), "type": "VEC3"}
             accessor |= {"min": _numbers(values.min(axis=0)), "max": _numbers(values.max(axis=0))}
         else:
@@ -142,18 +173,6 @@ class _Writer:
             blend = {"alphaMode": "BLEND"} if colour[3] < 1 else {}
             self._lists["materials"].append({"pbrMetallicRoughness": surface, "doubleSided": True} | blend)
         return self._materials[colour]
-
-    def _glb(self) -> bytes:
-        document = {"asset": {"version": "2.0", "generator": f"viewcell {__version__}"}}
-        document |= {"scene": 0, "scenes": [{"nodes": [0]}]}
-        document |= {name: rows for name, rows in self._lists.items() if rows}
-        if self._binary:
-            document["buffers"] = [{"byteLength": len(self._binary)}]
-        text = json.dumps(document, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode()
-        chunks = [(b"JSON", text + b" " * (-len(text) % 4))]
-        chunks += [(b"BIN\0", bytes(self._binary))] if self._binary else []
-        body = b"".join(CHUNK_HEAD.pack(len(data), kind) + data for kind, data in chunks)
-        return GLB_HEAD.pack(b"glTF", 2, GLB_HEAD.size + len(body)) + body
 
 
 def _skewed(linear: np.ndarray) -> bool:

@@ -8,12 +8,15 @@ from ...data.store.bake_folder import BakeFolder
 from .bits import HEADER, c_header, sets_as_bits
 from .glb import model_as_glb
 from .json_sets import sets_as_json
-from .place import check_places, write_file
+from .place import FOLDER_KIND, check_places, write_file
 from .portals import portals_as_prt
+from .tiles import write_tiles
 
 # What makes the file of each kind.
 FILES = {"prt": portals_as_prt, "json": sets_as_json, "bits": sets_as_bits, "glb": model_as_glb}
-KINDS = (*FILES,)
+# What writes the folder of each kind.
+FOLDERS = {FOLDER_KIND: write_tiles}
+KINDS = (*FILES, *FOLDERS)
 
 
 def export(bake: BakeFolder, outs: Mapping[str, str | Path], *, overwrite: bool = False) -> list[Path]:
@@ -21,7 +24,7 @@ def export(bake: BakeFolder, outs: Mapping[str, str | Path], *, overwrite: bool 
 
     Args:
         bake: to write.
-        outs: where to, by kind: files for prt, json, bits and glb.
+        outs: where to, by kind: files for prt, json, bits and glb, a folder for 3dtiles.
         overwrite: whether what is there may be replaced.
 
     Returns:
@@ -39,10 +42,13 @@ def export(bake: BakeFolder, outs: Mapping[str, str | Path], *, overwrite: bool 
     header = files["bits"].with_name(HEADER) if "bits" in files else None
     # The header is the same for every bake: one that is there already is no clash.
     beside = [] if header is None or _holds(header, c_header()) else [header]
-    check_places(bake, [*files.values(), *beside], [], overwrite)
+    folders = {kind: out for kind, out in places.items() if kind in FOLDERS}
+    check_places(bake, [*files.values(), *beside], folders.values(), overwrite)
     made = {out: FILES[kind](bake) for kind, out in files.items()} | {out: c_header() for out in beside}
     for out, data in made.items():
         write_file(out, data)
+    for kind, out in folders.items():
+        FOLDERS[kind](bake, out)
     return [*places.values(), *([] if header is None else [header])]
 
 
