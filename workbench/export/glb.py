@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...data.buildings.glb import COLOURS, Z_UP_TO_Y_UP, material_name
-from ...data.scene import Mesh, Scene, turned
+from ...data.scene import Mesh, Scene
 from ...data.store.bake_folder import BakeFolder
 from ...data.version import __version__
-from .sets import view_sets
+from .sets import model_of, placement
 
 GLB_HEAD, CHUNK_HEAD = struct.Struct("<4sII"), struct.Struct("<I4s")
 FLOAT, UNSIGNED_SHORT, UNSIGNED_INT = 5126, 5123, 5125
@@ -29,10 +29,8 @@ def model_as_glb(bake: BakeFolder) -> bytes:
     Raises:
         InputError: the bake is of a bare cell graph.
     """
-    view_sets(bake)
-    place = np.eye(4)
-    place[:3, :3], place[:3, 3] = turned(np.eye(3), bake.yaw_deg).T, bake.origin
-    return objects_as_glb(bake.scene, range(len(bake.scene.objects)), place)
+    scene = model_of(bake)
+    return objects_as_glb(scene, range(len(scene.objects)), placement(bake))
 
 
 def objects_as_glb(scene: Scene, object_ids: Sequence[int], place: np.ndarray) -> bytes:

@@ -7,6 +7,7 @@ import numpy as np
 from ...data.errors import InputError
 from ...data.plans import box_corners
 from ...data.ragged import starts_of
+from ...data.scene import Scene, turned
 from ...data.store.bake_folder import BakeFolder
 from ...data.verdict import Verdict
 
@@ -41,15 +42,31 @@ class ViewSets:
         return self.objects[self.starts[row] : self.starts[row + 1]]
 
 
-def view_sets(bake: BakeFolder) -> ViewSets:
-    """The view cells of a bake with what may be visible from them.
+def model_of(bake: BakeFolder) -> Scene:
+    """The bake's model.
 
     Raises:
         InputError: the bake is of a bare cell graph, without objects.
     """
     if bake.scene is None:
         raise InputError(f"{bake.folder}: expected a bake of a model, found one of cells and portals without objects")
-    graph = bake.graph
+    return bake.scene
+
+
+def placement(bake: BakeFolder) -> np.ndarray:
+    """What takes the bake's frame to the model's own [m], Z up, shape (4, 4), float64."""
+    out = np.eye(4)
+    out[:3, :3], out[:3, 3] = turned(np.eye(3), bake.yaw_deg).T, bake.origin
+    return out
+
+
+def view_sets(bake: BakeFolder) -> ViewSets:
+    """The view cells of a bake with what may be visible from them.
+
+    Raises:
+        InputError: the bake is of a bare cell graph, without objects.
+    """
+    scene, graph = model_of(bake), bake.graph
     cells = np.flatnonzero(graph.inhabitable)
     boxes = graph.cells[cells].astype(np.float64)
     cells = cells[np.argsort((boxes[:, 1] - boxes[:, 0]).prod(axis=1), kind="stable")]
@@ -73,5 +90,5 @@ def view_sets(bake: BakeFolder) -> ViewSets:
         starts_of(np.bincount(row, minlength=len(cells))),
         target[order],
         unknown[order],
-        len(bake.scene.objects),
+        len(scene.objects),
     )

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...data.scene import turned
 from ...data.store.bake_folder import BakeFolder
 from .groups import Groups, group_objects
 from .outside import boxes_outside
-from .sets import view_sets
+from .sets import placement, view_sets
 
 # How far from the model an eye may be [grid steps]; 16,000 km on a grid of a millimetre.
 REACH = 2**34
@@ -47,10 +46,8 @@ def tiled(bake: BakeFolder) -> TiledBake:
     rows = np.flatnonzero(sets.cells < graph.tile_count)
     cells = sets.cells[rows]
     boxes = graph.cells[cells].astype(np.int64)
-    place = np.eye(4)
-    place[:3, :3], place[:3, 3] = turned(np.eye(3), bake.yaw_deg).T, bake.origin
     # A step wider, as viewers round: on a border both neighbours show theirs, and nowhere nothing is shown.
     wider = np.array([[-1] * 3, [1] * 3])
     outside = boxes_outside(boxes, np.array([[-REACH] * 3, [REACH] * 3]))
     groups = group_objects(bake.scene, sets, rows)
-    return TiledBake(bake, cells, boxes + wider, outside + wider, groups, place, len(sets.cells) - len(cells))
+    return TiledBake(bake, cells, boxes + wider, outside + wider, groups, placement(bake), len(sets.cells) - len(cells))

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from builders import gltf_reader
 from builders.exported_house import STOOLS
-from viewcell.workbench.export.glb import model_as_glb
+from viewcell.data.scene import Definition, Instance, Mesh, Role, Scene
+from viewcell.workbench.export.glb import model_as_glb, objects_as_glb
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +66,15 @@ def test_a_shape_is_written_once(house, exported):
         return document["meshes"][nodes[name]["mesh"]]["primitives"][0]["attributes"]["POSITION"]
 
     assert nodes["case"]["mesh"] != nodes["glass"]["mesh"] and points("case") == points("glass")
+
+
+@pytest.mark.parametrize(("count", "kind"), [(2**16 - 1, 5123), (2**16, 5125)])
+def test_indices_are_as_short_as_may_be(count, kind):
+    """65,535 as a short index would end a strip."""
+    points = np.arange(3 * count, dtype=float).reshape(-1, 3)
+    mesh = Mesh(points, np.array([[0, 1, count - 1]], np.int32))
+    scene = Scene([Definition("many", (mesh,))], [Instance("many", "Thing", 0, np.eye(4), Role.DETAIL)])
+    data = objects_as_glb(scene, [0], np.eye(4))
+    document, _ = gltf_reader.split(data)
+    assert [a["componentType"] for a in document["accessors"] if a["type"] == "SCALAR"] == [kind]
+    assert gltf_reader.drawn(data)[0][1].tolist() == [points[[0, 1, count - 1]].tolist()]
