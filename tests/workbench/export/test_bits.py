@@ -1,9 +1,11 @@
 """The bit matrix, read by the C header that comes with it."""
 
+import re
 import subprocess
 
 import numpy as np
 import pytest
+from builders.places import ROOT
 from viewcell import InputError
 from viewcell.workbench.baked import load
 
@@ -77,3 +79,12 @@ def test_c_refuses_what_is_no_whole_file(program, tmp_path, damage):
     broken = tmp_path / "broken.bits"
     broken.write_bytes(damage(program[1].read_bytes()))
     assert subprocess.run([program[0], broken], input="", text=True, check=False).returncode == 3
+
+
+def test_the_guides_lines_of_c_compile(program):
+    page = (ROOT / "docs" / "guides" / "export.md").read_text(encoding="utf-8")
+    (lines,) = re.findall(r"^```c\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    head = '#include "viewcell_bits.h"\nvoid draw(uint32_t);\nstruct point { double x, y, z; };\n'
+    code = f"{head}int look(const void *data, uint64_t size, struct point eye) {{\n{lines}\nreturn 0; }}\n"
+    command = ["cc", "-std=c99", "-Wall", "-Werror", "-fsyntax-only", "-xc", "-"]
+    subprocess.run(command, input=code, text=True, check=True, cwd=program[0].parent)

@@ -1,7 +1,10 @@
 """Where exports go: nothing is replaced unasked, nothing is left half done."""
 
+import shutil
+
 import pytest
 from builders.four_rooms import hashes
+from builders.places import ROOT
 from viewcell import InputError
 from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
@@ -85,3 +88,13 @@ def test_a_full_disk_leaves_what_was_there(house, tmp_path, monkeypatch):
     with pytest.raises(InputError, match="No space left"):
         load(house.folder).export("json", out, overwrite=True)
     assert out.read_bytes() == b"mine" and [path.name for path in tmp_path.iterdir()] == ["house.json"]
+
+
+def test_the_guides_commands_do_what_they_say(house, tmp_path, monkeypatch, capsys):
+    page = (ROOT / "docs" / "guides" / "export.md").read_text(encoding="utf-8")
+    lines = [line.partition("#")[0].split() for line in page.splitlines() if line.startswith("    viewcell export")]
+    shutil.copytree(house.folder, tmp_path / "house.bake")
+    monkeypatch.chdir(tmp_path)
+    assert [main(words[1:]) for words in lines] == [0] * 4
+    names = {f"house.{kind}" for kind in ("bake", "glb", "json", "bits", "tiles", "prt")}
+    assert {path.name for path in tmp_path.iterdir()} == names | {"viewcell_bits.h"}
