@@ -17,6 +17,7 @@ from .places import Place, cell_at, cells_at, object_at
 
 if TYPE_CHECKING:
     from ..verify.findings import VerifyResult
+    from .export.run import Kind
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ class Bake(BakeFolder):
 
         return report(self, cells=cells, out=out, curves=curves)
 
-    def export(self, kind: str, out: str | Path, *, overwrite: bool = False) -> Path:
+    def export(self, kind: "Kind", out: str | Path, *, overwrite: bool = False) -> Path:
         """Write it for engines and other tools; docs/guides/export.md says what each kind holds.
 
         Args:

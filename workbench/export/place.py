@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ...data.errors import InputError
 from ...data.store.bake_folder import TABLES, BakeFolder
-from ...data.store.scene_folder import refuse_others
+from ...data.store.scene_folder import WRITING, refuse_others
 
 # As the manifest of an exported folder says it.
 FOLDER_KIND = "3dtiles"
@@ -61,11 +61,13 @@ def _refuse_own(folder: Path, out: Path) -> None:
 def write_file(out: Path, data: bytes) -> None:
     """Write a file: it is there whole, or what was there before still is.
 
+    What a killed command leaves behind is named as `viewcell clean` looks for it.
+
     Raises:
         InputError: it cannot be written.
     """
     try:
-        with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as scratch:
+        with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}{WRITING}") as scratch:
             (Path(scratch) / "new").write_bytes(data)
             os.replace(Path(scratch) / "new", out)
     except OSError as error:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Literal, get_args
 
 from ...data.errors import InputError
 from ...data.store.bake_folder import BakeFolder
@@ -16,10 +17,12 @@ from .tiles import write_tiles
 FILES = {"prt": portals_as_prt, "json": sets_as_json, "bits": sets_as_bits, "glb": model_as_glb}
 # What writes the folder of each kind.
 FOLDERS = {FOLDER_KIND: write_tiles}
-KINDS = (*FILES, *FOLDERS)
+# As editors and type checkers know them.
+Kind = Literal["prt", "json", "bits", "glb", "3dtiles"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
-def export(bake: BakeFolder, outs: Mapping[str, str | Path], *, overwrite: bool = False) -> list[Path]:
+def export(bake: BakeFolder, outs: Mapping[Kind, str | Path], *, overwrite: bool = False) -> list[Path]:
     """Write a bake in other programs' formats (docs/guides/export.md); what is refused is so before any is written.
 
     Args:

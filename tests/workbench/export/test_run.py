@@ -6,9 +6,10 @@ import pytest
 from builders.four_rooms import hashes
 from builders.places import ROOT
 from viewcell import InputError
+from viewcell.workbench.bake.place import leftovers
 from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
-from viewcell.workbench.export.run import FILES, export
+from viewcell.workbench.export.run import FILES, FOLDERS, KINDS, export
 
 
 def refused(capsys, *arguments):
@@ -78,16 +79,20 @@ def test_what_cannot_be_exported_is_told_in_one_line(house, baked, tmp_path, cap
 
 
 def test_a_full_disk_leaves_what_was_there(house, tmp_path, monkeypatch):
-    out = tmp_path / "house.json"
+    out, left = tmp_path / "house.json", []
     out.write_bytes(b"mine")
 
     def full(*_):
+        # Had it been killed here, `viewcell clean` would know what is left.
+        left.extend(leftovers(tmp_path))
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("viewcell.workbench.export.place.os.replace", full)
     with pytest.raises(InputError, match="No space left"):
         load(house.folder).export("json", out, overwrite=True)
-    assert out.read_bytes() == b"mine" and [path.name for path in tmp_path.iterdir()] == ["house.json"]
+    assert (
+        len(left) == 1 and out.read_bytes() == b"mine" and [path.name for path in tmp_path.iterdir()] == ["house.json"]
+    )
 
 
 def test_the_guides_commands_do_what_they_say(house, tmp_path, monkeypatch, capsys):
@@ -98,3 +103,7 @@ def test_the_guides_commands_do_what_they_say(house, tmp_path, monkeypatch, caps
     assert [main(words[1:]) for words in lines] == [0] * 4
     names = {f"house.{kind}" for kind in ("bake", "glb", "json", "bits", "tiles", "prt")}
     assert {path.name for path in tmp_path.iterdir()} == names | {"viewcell_bits.h"}
+
+
+def test_editors_complete_what_can_be_exported():
+    assert KINDS == (*FILES, *FOLDERS)
