@@ -3,7 +3,7 @@
     pip install viewcell[test]
     pytest test_my_pvs.py --viewcell-model house.ifc
 
-`scene` and `assert_conservative` come with viewcell. The test fails where the sets hide what can be seen from a view
+`viewcell_scene` and `assert_conservative` come with viewcell. The test fails where the sets hide what can be seen from a view
 cell, with a sightline for each; that a set is larger than it need be is no fault, and is told with `-s`.
 """
 
@@ -39,7 +39,7 @@ def write_claims(scene, folder):
     return folder / "pvs.parquet", folder / "cells.parquet"
 
 
-def test_nothing_visible_is_hidden(scene, assert_conservative, tmp_path):
+def test_nothing_visible_is_hidden(viewcell_scene, assert_conservative, tmp_path):
     """No sightline from a view cell shows what its set leaves out."""
-    pvs, cells = write_claims(scene, tmp_path)
-    print(assert_conservative(pvs, scene, cells=cells, rays=200_000).table())
+    pvs, cells = write_claims(viewcell_scene, tmp_path)
+    print(assert_conservative(pvs, viewcell_scene, cells=cells, rays=200_000).table())

@@ -147,10 +147,10 @@ MINE = example_test()
 test_of_ones_own_baker = MINE.test_nothing_visible_is_hidden
 
 
-def test_a_baker_that_hides_what_is_visible_fails_there(scene, tmp_path, assert_conservative, monkeypatch):
+def test_a_baker_that_hides_what_is_visible_fails_there(viewcell_scene, tmp_path, assert_conservative, monkeypatch):
     keep = MINE.my_baker
-    floor = next(number for number, placed in enumerate(scene.objects) if placed.kind == "IfcSlab")
+    floor = next(number for number, placed in enumerate(viewcell_scene.objects) if placed.kind == "IfcSlab")
     monkeypatch.setattr(MINE, "my_baker", lambda *asked: [pair for pair in keep(*asked) if pair != (0, floor)])
-    assert len(MINE.view_cells(scene)) > 1
+    assert len(MINE.view_cells(viewcell_scene)) > 1
     with pytest.raises(AssertionError, match="not conservative: 1 visible pair"):
-        MINE.test_nothing_visible_is_hidden(scene, assert_conservative, tmp_path)
+        MINE.test_nothing_visible_is_hidden(viewcell_scene, assert_conservative, tmp_path)
