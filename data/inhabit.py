@@ -71,7 +71,9 @@ def find_inhabitable(scene: Scene, graph: CellGraph) -> Inhabited:
     inner &= (graph.cells[:, 1] < graph.cells[:, 1].max(axis=0)).all(axis=1)
     if not (roomy & inner).any():
         inner[:] = True
-    reason = "the model names no rooms and the outside leaks into all of it: every roomy cell inside the margin"
+    named = len(scene.spaces) + len(scene.lost_rooms)
+    rooms = f"no cell lies in any of the model's {named} rooms" if named else "the model names no rooms"
+    reason = f"{rooms}, and the outside leaks into all of it: every roomy cell inside the margin"
     return Inhabited(roomy & inner, names, reason, leak)
 
 

@@ -3,8 +3,8 @@
     pip install viewcell[test]
     pytest test_my_pvs.py --viewcell-model house.ifc
 
-`viewcell_scene` and `assert_conservative` come with viewcell. The test fails where the sets hide what can be seen from a view
-cell, with a sightline for each; that a set is larger than it need be is no fault, and is told with `-s`.
+`viewcell_scene` and `assert_conservative` come with viewcell. The test fails where the sets hide what can be seen from
+a view cell, with a sightline for each; that a set is larger than it need be is no fault, and is told with `-s`.
 """
 
 import pyarrow as pa

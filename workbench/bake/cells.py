@@ -9,6 +9,7 @@ from ...data.cracks import crack_portals
 from ...data.errors import InputError
 from ...data.graph import CellGraph
 from ...data.inhabit import find_inhabitable
+from ...data.plausible import implausible
 from ...data.portals import find_portals
 from ...data.prepared import PreparedModel
 from ...data.room_cells import add_room_cells
@@ -85,8 +86,11 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
     """
     scene = model.scene
     facts = scene_manifest(scene)
+    warnings = [f"as it is read, {fault.what}; {fault.do}" for fault in implausible(scene)]
     if not model.closed:
-        facts["warnings"] = ["no closed opaque solid: only surfaces occlude, and every point counts as outside"]
+        warnings.append("no closed opaque solid: only surfaces occlude, and every point counts as outside")
+    if warnings:
+        facts["warnings"] = warnings
     clock.lap("read")
     cells, method = settings.cells, settings.method
     large = len(scene.triangles()[0]) > PORTAL_TRIANGLES

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator
 from textwrap import wrap
 
+from ...data.plausible import implausible
 from ...data.scene import Role
 from ...verify.check_result import counted
 from ..summary import KINDS, wall_words
@@ -14,12 +15,8 @@ WIDTH, INDENT = 112, 14
 KINDS_SHOWN, TOLD_SHOWN, SKIPPED_SHOWN, NAMED = 5, 4, 3, 2
 # Shares of upright faces off the main axes, and of opaque objects that are open, that are worth a word.
 TURNED_SHARE, OPEN_SHARE = 0.1, 0.05
-# A building that is so much lower along y than otherwise may lie on its side.
-LYING_SHARE = 0.5
 # Walls as near to an axis as this are meant to stand along it.
 NEARLY_DEG = 0.5
-# A building larger than this, or smaller than that [m], is likely in another unit.
-LARGE_M, SMALL_M = 5000.0, 0.5
 
 # What is wrong, what it costs, and what to do.
 Words = tuple[str, str, str]
@@ -209,22 +206,12 @@ def _reading(found: Inspection) -> Iterator[Words]:
             "what is missing hides nothing, so more is called visible; it is never drawn",
             "look at all with --json, and mend those that should be walls",
         )
-    if found.unit_because.startswith("assumed") and found.size_m[1] < LYING_SHARE * min(found.size_m[[0, 2]]):
+    for fault in implausible(scene):
         yield (
-            "the model is lowest along y, as if y pointed up",
-            "floors are taken for walls: where one can stand, storeys and plans are wrong",
-            "if it lies on its side: --up y",
+            f"as it is read, {fault.what}",
+            "distances, storeys, cell sizes and levels of detail are off if it is read wrong",
+            fault.do,
         )
-    if max(found.size_m) > LARGE_M or max(found.size_m) < SMALL_M:
-        yield (
-            f"the model is {_metres(max(found.size_m))} m long",
-            "distances, cell sizes and levels of detail are off if its unit is another",
-            "tell the unit: --unit millimetre, inch, ...",
-        )
-
-
-def _metres(length: float) -> str:
-    return f"{length:,.0f}" if length >= 1.0 else f"{length:.3g}"
 
 
 def _walls(found: Inspection) -> Iterator[Words]:

@@ -8,8 +8,8 @@ import viewcell
 from builders.random_buildings import two_solids
 from viewcell.data.errors import InputError
 from viewcell.data.store.scene_folder import write_scene
-from viewcell.workbench.bake import run
-from viewcell.workbench.bake.place import clean, leftovers
+from viewcell.workbench.bake import blocks, run
+from viewcell.workbench.bake.place import alone, clean, leftovers
 from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.cli import main
 
@@ -121,3 +121,41 @@ def test_a_made_building_replaces_nothing_unasked(name, tmp_path, capsys):
     assert "--overwrite replaces it" in capsys.readouterr().err and out.read_text() == "mine"
     if name.endswith(".glb"):
         assert main([*command, "--overwrite"]) == 0 and out.read_bytes()[:4] == b"glTF"
+
+
+def test_one_bake_at_a_time(tmp_path):
+    out = tmp_path / "a.bake"
+    with alone(out):
+        with pytest.raises(InputError, match="expected no bake that is being written there"):
+            viewcell.bake(two_solids(), out, threads=1)
+        assert not out.exists()
+    assert not list(tmp_path.iterdir())
+    viewcell.bake(two_solids(), out, threads=1)
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_leftovers_are_those_of_the_very_name(tmp_path):
+    for name in (".a[1].bake.0123.partial", ".a1.bake.0123.partial"):
+        (tmp_path / name).mkdir()
+    assert [path.name for path in leftovers(tmp_path, "a[1].bake")] == [".a[1].bake.0123.partial"]
+    assert len(leftovers(tmp_path)) == 2
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_only_a_bake_that_resumes_says_so(kept, tmp_path, monkeypatch, capsys):
+    """Blocks of another bake beside it do not count."""
+    write_scene(two_solids(), tmp_path / "a.scene")
+    monkeypatch.chdir(tmp_path)
+    other = tmp_path / ".a.bake.0123456789abcdef.partial"
+    other.mkdir()
+    (other / "0.arrow").write_bytes(b"")
+    whole = blocks.Work.all_parts
+
+    def interrupt(self, cut):
+        if kept:
+            whole(self, cut)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(blocks.Work, "all_parts", interrupt)
+    assert main(["bake", "a.scene"]) == 130
+    assert ("the same command goes on from there" in capsys.readouterr().err) == kept
