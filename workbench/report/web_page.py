@@ -7,14 +7,13 @@ cut surfaces to DRAWN_STEPS grid steps and more if there are too many, sightline
 
 import base64
 import gzip
-import html
 import json
-import re
 from importlib.resources import files
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pyarrow as pa
+from markupsafe import Markup
 
 from ...data.carving import find_faces
 from ...data.ragged import starts_of
@@ -23,6 +22,7 @@ from ...data.version import __version__
 from ...verify.findings import count_pairs
 from ...verify.rays.witness import read_witnesses
 from ..bake.worth import told_worth
+from ..pages import fill
 from ..summary import face_rows, kept_rows
 from .modules import join_modules
 from .plans import Storey, find_storeys, plan_of, section_lines
@@ -77,12 +77,11 @@ def page(
         told: as from `told_worth`, if it is known already.
     """
     folder = files(__package__) / "page"
-    parts = {"title": html.escape(title), "script": join_modules(folder, "main.mjs")}
-    parts["style"] = (folder / "report.css").read_text("utf-8")
+    parts = {"script": join_modules(folder, "main.mjs"), "own_style": (folder / "report.css").read_text("utf-8")}
     data = json.dumps(page_data(bake, title, curves, told), separators=(",", ":"), allow_nan=False)
     # In a script element only "<" could end or open anything.
     parts["data"] = data.replace("<", "\\u003c")
-    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], (folder / "report.html").read_text("utf-8"))
+    return fill(folder, "report.html", title=title, **{name: Markup(text) for name, text in parts.items()})
 
 
 def page_data(
