@@ -12,6 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from .graph import CellGraph
+from .plural import counted
 from .room_cells import in_room, room_name
 from .scene import Scene
 
@@ -50,7 +51,7 @@ def find_inhabitable(scene: Scene, graph: CellGraph) -> Inhabited:
     if scene.spaces:
         names = _rooms_of(scene, graph, roomy)
         mask = names != ""
-        reason = f"inside the model's {len(scene.spaces)} rooms"
+        reason = f"inside the model's {counted(len(scene.spaces), 'room')}"
         if mask.any() and scene.lost_rooms:
             # Rooms that the model names without a body are among what flooding finds.
             enclosed, leak = _flood(scene, graph)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..data.plural import counted
 from ..data.scene import turned
 from .rays.confidence import Confidence
 
@@ -198,11 +199,6 @@ class CheckResult:
                 numbers = f"{claimed[row]:,} | {seen[row]:,} | {_ratio(claimed[row], seen[row])} | {wrong[row]:,}"
                 lines.append(f"| {self.cell_text(self.sources[row])} | {numbers} |")
         return lines
-
-
-def counted(count: int, what: str) -> str:
-    """A number of things, in words."""
-    return f"{count:,} {what}{'' if count == 1 else 's'}"
 
 
 def _ratio(claimed: int, seen: int) -> str:

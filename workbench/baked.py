@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyarrow as pa
 
+from ..data.plural import counted
 from ..data.scene import CORNERS
 from ..data.store.bake_folder import WITNESS, BakeFolder, read_bake
 from ..data.store.scene_folder import read_table
@@ -47,8 +48,8 @@ class Bake(BakeFolder):
     def __repr__(self) -> str:
         """What it is of, how large, and what it culls, on a line."""
         counts, kept = self.manifest["counts"], self.manifest.get("kept") or {}
-        parts = [f"{counts['objects']:,} objects" if counts["objects"] else "a bare graph"]
-        parts.append(f"{int(self.graph.inhabitable.sum()):,} of {self.graph.cell_count:,} cells inhabitable")
+        parts = [counted(counts["objects"], "object") if counts["objects"] else "a bare graph"]
+        parts.append(f"{int(self.graph.inhabitable.sum()):,} of {counted(self.graph.cell_count, 'cell')} inhabitable")
         if "objects" in kept:
             parts.append(f"{100 * kept['objects']:.1f} % kept")
         return f"<Bake {str(self.folder)!r}: {', '.join(parts)}>"

@@ -15,6 +15,8 @@ from .terminal import INTERRUPTED, UNUSABLE, complain, watched
 
 # Seeds go to kernels as int32.
 SEED_LIMIT = 2**31
+# What `tune` tunes; a model in their place means the first.
+SOLVERS = ("bake", "projection-point", "lod")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -27,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code. What the user can mend, a full disk and a lack of memory are one line on stderr.
     """
     try:
-        options = _parser().parse_args(argv)
+        options = _parser().parse_args(_with_solver(sys.argv[1:] if argv is None else argv))
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else 0
     try:
@@ -56,6 +58,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         where = f"{error.filename}: " if error.filename else ""
         complain(f"{where}expected to be able to read and write, found {error.strerror or error}")
     return UNUSABLE
+
+
+def _with_solver(argv: Sequence[str]) -> list[str]:
+    """Arguments in which `tune MODEL` names what it tunes: the bake."""
+    if argv[:1] != ["tune"] or len(argv) < 2 or argv[1] in ("-h", "--help", *SOLVERS):
+        return list(argv)
+    return ["tune", "bake", *argv[1:]]
 
 
 class _Parser(argparse.ArgumentParser):
@@ -349,15 +358,42 @@ def _numbers(text: str) -> list[float]:
 
 
 def _add_tune(commands: argparse._SubParsersAction) -> None:
-    tune = commands.add_parser("tune", help="try settings on your own model", description="Try settings on a model.")
-    solvers = tune.add_subparsers(title="solvers", metavar="SOLVER", required=True)
+    text = "Try settings on your own model; viewcell tune MODEL is short for viewcell tune bake MODEL."
+    tune = commands.add_parser("tune", help="try settings on your own model", description=text)
+    solvers = tune.add_subparsers(title="what is tuned", metavar="WHAT", required=True)
+    _add_tune_bake(solvers)
     _add_tune_points(solvers)
     _add_tune_lod(solvers)
 
 
+def _add_tune_bake(solvers: argparse._SubParsersAction) -> None:
+    bake = _command(
+        solvers,
+        "bake",
+        "tune_bake",
+        "Try settings beside the default's, and recommend one that is no looser and no slower; else the default.",
+    )
+    bake.add_argument("model", metavar="MODEL", help="whatever viewcell bake takes, but no bare graph")
+    bake.add_argument("-o", "--out", metavar="FOLDER", help="folder to write; MODEL's name with .tune by default")
+    bake.add_argument(
+        "--budget",
+        type=_number,
+        default=300.0,
+        metavar="SECONDS",
+        help="about how long it may take, without reading; 300 by default. Fewer view cells are tried if it is short",
+    )
+    bake.add_argument("--threads", type=_whole(1), help="CPU threads; all cores by default")
+    bake.add_argument("--device", default="cpu", help="Warp device, such as cuda:0; cpu by default")
+    _add_numbers(bake)
+    _add_settings(bake.add_argument_group("settings that are kept as you give them"))
+
+
 def _add_tune_points(solvers: argparse._SubParsersAction) -> None:
     points = _command(
-        solvers, "projection-point", "tune_points", "Try ways to choose projection points on view cells of a bake."
+        solvers,
+        "projection-point",
+        "tune_points",
+        "Try ways to choose projection points of the method vlod, beside the default, on view cells of a bake.",
     )
     points.add_argument("bake", metavar="BAKE", help="bake folder of a model")
     points.add_argument("--cells", type=_whole(1), default=8, help="view cells to try them on; 8 by default")

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..data.errors import InputError
+from ..data.plural import counted
 from .summary import summary, table
 from .terminal import FAILED, INTERRUPTED, complain, say
 
@@ -94,10 +95,11 @@ def bake(options: argparse.Namespace) -> int:
     from .bake.settings_file import SettingsFile, read_settings
 
     model = Path(options.model)
-    asked = {field.name: getattr(options, field.name, None) for field in fields(Settings)}
-    given = {name: value for name, value in asked.items() if value is not None}
+    given = _given(options)
     file = read_settings(options.settings) if options.settings else SettingsFile({}, {})
     settings = Settings(**(file.settings | given))
+    if file.line:
+        say(f"{options.settings}: {file.line}")
     out = Path(options.out) if options.out else default_out(model)
     for folder in leftovers(out.absolute().parent, out.name):
         say(f"unfinished: {folder.name}; the bake that it is of goes on from there, viewcell clean removes it")
@@ -121,6 +123,14 @@ def bake(options: argparse.Namespace) -> int:
     fresh = _stamp(out) != before
     say(f"written to {made.folder}" if fresh else f"{made.folder} was up to date; --overwrite bakes it again")
     return 0
+
+
+def _given(options: argparse.Namespace) -> dict[str, object]:
+    """Settings that were given on the command line, by name."""
+    from .bake.settings import Settings
+
+    asked = {field.name: getattr(options, field.name, None) for field in fields(Settings)}
+    return {name: value for name, value in asked.items() if value is not None}
 
 
 def clean(options: argparse.Namespace) -> int:
@@ -238,6 +248,30 @@ def check(options: argparse.Namespace) -> int:
     return 0 if result.ok else FAILED
 
 
+def tune_bake(options: argparse.Namespace) -> int:
+    """Try settings beside the default's on a model, print what came of it and write it down."""
+    from .bake.run import default_out
+    from .bake.settings import Settings
+    from .tune.bake import tune_bake as tune
+    from .tune.bake_words import tuning_text, write_tuning
+
+    model, given = Path(options.model), _given(options)
+    settings = Settings(**given)
+    out = Path(options.out) if options.out else default_out(model).with_suffix(".tune")
+    found = tune(
+        _read(model, options, settings.reading | settings.frame),
+        settings=settings,
+        asked=given,
+        budget_s=options.budget,
+        threads=options.threads,
+        device=options.device,
+    )
+    say(tuning_text(found))
+    file = write_tuning(found, out)
+    say(f"written to {out}; viewcell bake {model} --settings {file} bakes with it")
+    return FAILED if found.wrong_hidden else 0
+
+
 def tune_points(options: argparse.Namespace) -> int:
     """Try ways to choose projection points, print what came of it and write it down."""
     from .baked import load
@@ -246,7 +280,7 @@ def tune_points(options: argparse.Namespace) -> int:
     found = tune_projection_point(load(options.bake), cells=options.cells, seed=options.seed, out=options.out)
     say(point_lines(found))
     if found.wrong_hidden:
-        print(f"viewcell: {found.wrong_hidden} pairs hidden although seen; this is a bug", file=sys.stderr)
+        print(f"viewcell: {counted(found.wrong_hidden, 'pair')} hidden although seen; this is a bug", file=sys.stderr)
     return FAILED if found.wrong_hidden else 0
 
 
@@ -369,6 +403,6 @@ def export(options: argparse.Namespace) -> int:
         from ..data.store.quake import UNIT_STEPS
 
         graph, unit = made.graph, f"1 unit = {UNIT_STEPS * made.grid_m:g} m"
-        say(f"{graph.tile_count:,} leaves, {graph.portal_count:,} portals, {unit}")
+        say(f"{counted(graph.tile_count, 'leaf', 'leaves')}, {counted(graph.portal_count, 'portal')}, {unit}")
         say(f"viewcell check {options.prt} --pvs SETS judges the sets that another tool computes for it")
     return 0

@@ -4,6 +4,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from ..data.carving import BANDS
+from ..data.plural import counted
 
 if TYPE_CHECKING:
     from ..data.carving import Faces
@@ -20,8 +21,8 @@ def summary(bake: "BakeFolder") -> str:
     counts, facts = bake.manifest["counts"], bake.manifest
     because = facts.get("inhabitable_because", "as its cells table says")
     lines = [
-        f"{counts['cells']:,} cells, {counts['inhabitable']:,} inhabitable ({because})",
-        f"{counts['portals']:,} portals, {counts['objects']:,} objects",
+        f"{counted(counts['cells'], 'cell')}, {counts['inhabitable']:,} inhabitable ({because})",
+        f"{counted(counts['portals'], 'portal')}, {counted(counts['objects'], 'object')}",
     ]
     if facts.get("yaw_deg"):
         lines.append(
@@ -37,7 +38,8 @@ def summary(bake: "BakeFolder") -> str:
         lines += [f"{share:.1f} % of the triangles in these sets face away from all of their cell", ""]
     if "closed_cracks" in counts:
         lines += [
-            f"{counts['closed_cracks']:,} cracks closed; that alone hides {counts['leak_cell_pairs']:,} pairs of cells "
+            f"{counted(counts['closed_cracks'], 'crack')} closed; that alone hides "
+            f"{counted(counts['leak_cell_pairs'], 'pair')} of cells "
             f"and {counts['leak_object_pairs']:,} of cells and objects, listed in leaks.parquet",
             "",
         ]
@@ -56,9 +58,13 @@ def kept_lines(kept: dict) -> list[str]:
     if eye := kept["eye"]:
         lines.append(
             f"kept / eye: {eye['median']:.2f} in the median, {eye['worst']:.2f} at worst (cell {eye['worst_cell']}); "
-            f"{eye['eyes']} random eyes in each of {eye['cells']} cells"
+            f"{_eyes(eye)}"
         )
     return lines
+
+
+def _eyes(eye: dict) -> str:
+    return f"{counted(eye['eyes'], 'random eye')} in each of {counted(eye['cells'], 'cell')}"
 
 
 def kept_rows(kept: dict) -> list[tuple[str, str]]:
@@ -67,7 +73,7 @@ def kept_rows(kept: dict) -> list[tuple[str, str]]:
     if eye := kept["eye"]:
         rows += [("kept / eye, median", f"{eye['median']:.2f}")]
         rows += [(f"kept / eye, worst (cell {eye['worst_cell']})", f"{eye['worst']:.2f}")]
-        rows += [("random eyes", f"{eye['eyes']} in each of {eye['cells']} cells")]
+        rows += [("random eyes", f"{eye['eyes']} in each of {counted(eye['cells'], 'cell')}")]
     return rows
 
 
@@ -95,7 +101,9 @@ def _certificates(bake: "BakeFolder") -> str:
     count, seconds = bake.manifest["counts"]["proofs"], bake.manifest["certificate_s"]
     size = sum((bake.folder / f"{name}.parquet").stat().st_size for name in TABLES)
     each = max(count, 1)
-    return f"{count:,} proofs, a proof {size / each:,.0f} bytes and {1e6 * seconds / each:,.0f} us to write down"
+    return (
+        f"{counted(count, 'proof')}, a proof {size / each:,.0f} bytes and {1e6 * seconds / each:,.0f} us to write down"
+    )
 
 
 def _skipped(skipped: list[dict[str, str]]) -> list[str]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..frame import turn_note, wall_yaw
+from ..plural import counted
 from ..scene import GRID_LIMIT, Definition, Instance, Mesh, NamedStorey, Role, Scene, Space, degenerate, snap, turned
 
 MAX_COORDINATE_M = 1.0e9
@@ -221,7 +222,7 @@ def _share(parts: list[Part], origin: np.ndarray, model: Model) -> tuple[list[De
         words = part.guid, part.why, part.storey, part.materials
         objects.append(Instance(part.name, part.kind, definition_id, to_scene, part.role, *words))
     if dropped:
-        model.skip(f"{dropped} triangles", "no area on the grid")
+        model.skip(counted(dropped, "triangle"), "no area on the grid")
     return definitions, objects
 
 

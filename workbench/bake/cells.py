@@ -10,6 +10,7 @@ from ...data.errors import InputError
 from ...data.graph import CellGraph
 from ...data.inhabit import find_inhabitable
 from ...data.plausible import implausible
+from ...data.plural import counted
 from ...data.portals import find_portals
 from ...data.prepared import PreparedModel
 from ...data.room_cells import add_room_cells
@@ -149,7 +150,7 @@ def _with_rooms(model: PreparedModel, graph: CellGraph) -> tuple[CellGraph, dict
     graph, covers = add_room_cells(model.scene, graph, model.room_points)
     notes = {"rooms": [cover.entry for cover in covers]}
     if bare and graph.inhabitable.any():
-        notes["inhabitable_because"] = f"inside the model's {len(spaces)} rooms"
+        notes["inhabitable_because"] = f"inside the model's {counted(len(spaces), 'room')}"
     elif bare:
         graph.inhabitable = inhabitable
     return graph, notes

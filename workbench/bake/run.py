@@ -113,7 +113,7 @@ def _bake(model: Scene | str | Path, settings: Settings, overwrite: bool, tuned:
     """As `bake`, of checked settings into a place that may be written; finds the fingerprint of `run` first."""
     out, clock = run.out, run.clock
     clock.show("read")
-    scene, graph_folder = _open(model, settings)
+    scene, graph_folder = open_model(model, settings)
     known = fingerprint(scene, graph_folder, settings, (blocks.BLOCK, blocks.VIEW_BLOCK))
     if not overwrite and (done := held_manifest(out, "bake")) is not None:
         if done.get("fingerprint") != known:
@@ -142,7 +142,12 @@ def _bake(model: Scene | str | Path, settings: Settings, overwrite: bool, tuned:
         raise
 
 
-def _open(model: Scene | str | Path, settings: Settings) -> tuple[Scene | None, Path | None]:
+def open_model(model: Scene | str | Path, settings: Settings) -> tuple[Scene | None, Path | None]:
+    """The model, as the settings want it read; or, of a bare graph, its folder.
+
+    Raises:
+        InputError: it is unreadable, or settings speak of what a folder has settled.
+    """
     if isinstance(model, Scene):
         from ...data.frame import in_frame
 
@@ -229,7 +234,7 @@ def _leaks(sources: Sources, rows: tuple[Rows, Rows], settings: Settings, run: _
     fields = "portal_cells", "portal_axis", "portals"
     both = [np.concatenate([getattr(part, name) for part in (graph, closed)]) for name in fields]
     whole = CellGraph(graph.cells, graph.inhabitable, graph.cell_names, *both, graph.plans)
-    engine = _engine(replace(sources, graph=whole), settings, run.device)
+    engine = engine_of(replace(sources, graph=whole), settings, run.device)
     parts = [engine.visible(block, aim=False) for block in in_blocks(sources)]
     pairs = []
     for open_rows, kept, targets in zip(engine.join(parts), rows, (graph.cell_count, len(scene.objects)), strict=True):
@@ -244,7 +249,7 @@ def _leaks(sources: Sources, rows: tuple[Rows, Rows], settings: Settings, run: _
     return {"cracks": portals_table(closed, scene.grid_m), "leaks": leaks_table(*pairs)}
 
 
-def _engine(sources: Sources, settings: Settings, device: "Device") -> "Engine":
+def engine_of(sources: Sources, settings: Settings, device: "Device") -> "Engine":
     """The engine that answers from these cells."""
     options = {"seed": settings.seed, "device": device, "certify": settings.certify}
     if sources.model is None:
@@ -271,7 +276,7 @@ def _visibility(
     clock = run.clock
     started = time.perf_counter()
     clock.show("prepare")
-    engine = _engine(sources, settings, run.device)
+    engine = engine_of(sources, settings, run.device)
     clock.lap("prepare")
     compiled = time.perf_counter()
     clock.show("compile")

@@ -20,10 +20,20 @@ class SettingsFile:
     Attributes:
         settings: values by key of `Settings`; keys that the file leaves out are absent.
         tuned: parts of a tune file that a bake's manifest stores, by name; empty for plain settings.
+        says: what a tune file says that it does, beside the default, in a line; empty if it says nothing.
     """
 
     settings: dict[str, object]
     tuned: dict[str, dict]
+    says: str = ""
+
+    @property
+    def line(self) -> str:
+        """What whoever bakes with the file should know of it; empty if there is nothing."""
+        method, usual = self.settings.get("method"), Settings().method
+        if self.says or method in (None, usual):
+            return self.says
+        return f"Changes the method from {usual}, the default, to {method}."
 
 
 def read_settings(path: str | Path) -> SettingsFile:
@@ -42,8 +52,11 @@ def read_settings(path: str | Path) -> SettingsFile:
         raise InputError(f"{path}: expected JSON, found {one_line(error)}") from None
     if not isinstance(found, dict):
         raise InputError(f"{path}: expected a JSON object, found {type(found).__name__}")
-    tuned: dict[str, dict] = {}
+    tuned, says = {}, ""
     if "tuned" in found:
+        says = found.get("says", "")
+        if not isinstance(says, str):
+            raise InputError(f"{path}: expected text as says, found {type(says).__name__}")
         tuned = {name: found[name] for name in KEPT if name in found}
         found = found.get("settings", {})
         for name, part in (("settings", found), *tuned.items()):
@@ -55,7 +68,9 @@ def read_settings(path: str | Path) -> SettingsFile:
             raise InputError(f"{path}: expected keys among {', '.join(defaults)}; found {name!r}")
         if not _fits(value, defaults[name]):
             raise InputError(f"{path}: expected {name} to be like {json.dumps(defaults[name])}, found {value!r}")
-    return SettingsFile({name: type(defaults[name])(value) for name, value in found.items()}, tuned)
+    return SettingsFile(
+        {name: type(defaults[name])(value) for name, value in found.items()}, tuned, " ".join(says.split())
+    )
 
 
 def _fits(value: object, default: object) -> bool:

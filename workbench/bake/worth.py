@@ -8,6 +8,7 @@ import numpy as np
 from ...data.graph import CellGraph
 from ...data.kept import kept_shares, mean_kept
 from ...data.leaks import cells_behind_cracks
+from ...data.plural import counted
 from ...data.prepared import PreparedModel
 from ...data.room_cells import room_covers
 
@@ -130,8 +131,8 @@ def _room_words(uncovered: list[dict], rooms: int) -> list[str]:
     more = f" and {len(uncovered) - ROOMS_NAMED:,} more" if len(uncovered) > ROOMS_NAMED else ""
     verb = "is" if len(uncovered) == 1 else "are"
     return [
-        f"{len(uncovered):,} of {rooms:,} rooms {verb} not covered by view cells, so not all that one sees there is "
-        f"known: {named}{more}; --cells octree --method occluders looks from all that can be walked"
+        f"{len(uncovered):,} of {counted(rooms, 'room')} {verb} not covered by view cells, so not all that one sees "
+        f"there is known: {named}{more}; --cells octree --method occluders looks from all that can be walked"
     ]
 
 
@@ -145,7 +146,7 @@ def _leak_words(leak: list[int], leaky: int, inhabitable: int) -> list[str]:
         )
     if leaky:
         words.append(
-            f"through cracks alone the outside leaks into {leaky:,} of {inhabitable:,} inhabitable cells; "
+            f"through cracks alone the outside leaks into {leaky:,} of {counted(inhabitable, 'inhabitable cell')}; "
             f"{LOOK} shows them, --seal {CRACK_M:g} closes them"
         )
     return words
@@ -157,9 +158,11 @@ def _budget_words(budget: dict | None) -> list[str]:
     do = "give it more"
     if budget["needed_s"] is not None:
         do = f"--budget {_rounded_up(budget['needed_s']):g} is about enough"
+    verb = "is" if budget["pairs"] == 1 else "are"
+    left = f"{counted(budget['pairs'], 'pair')} of {counted(budget['cells'], 'view cell')}"
     return [
-        f"the budget of {budget['budget_s']:g} s ended early, {PHASES[budget['phase']]}: {budget['pairs']:,} pairs of "
-        f"{budget['cells']:,} view cells are left undecided, and kept; {do}, and the same command goes on from here"
+        f"the budget of {budget['budget_s']:g} s ended early, {PHASES[budget['phase']]}: {left} {verb} "
+        f"left undecided, and kept; {do}, and the same command goes on from here"
     ]
 
 

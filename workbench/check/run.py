@@ -14,13 +14,14 @@ import pyarrow as pa
 
 from ...data.errors import InputError
 from ...data.graph import CellGraph
+from ...data.plural import counted
 from ...data.progress import phase, shown
 from ...data.scene import OPAQUE, Role, Scene
 from ...data.store.claims import Claims, read_claims
 from ...data.store.room_tables import read_room_table, words_of_cells
 from ...data.store.scene_folder import read_manifest
 from ...data.store.view_cells import ViewCells, read_rows, view_cells
-from ...verify.check_result import CheckResult, WrongPair, counted
+from ...verify.check_result import CheckResult, WrongPair
 from ...verify.exact.sightline import Sightlines
 from ...verify.exact.trace import contact_links
 from ...verify.rays.adjudicate import Judge, Judgement, sightline_end

@@ -70,10 +70,16 @@ class Curves:
         return [one for one in self.series if one.method not in (SAMPLING, LEVELS)]
 
     @property
-    def front(self) -> list[Point]:
-        """Points that no other beats in both time and error, fastest first.
+    def compared(self) -> list[Series]:
+        """Those among them that are of the same view cells: time and error may be compared point by point."""
+        return [one for one in self.safe if not one.apart]
 
-        Those of a method that hides something visible at any setting take no part: it is not safe at the others either.
+    @property
+    def front(self) -> list[Point]:
+        """Points that no other of the same view cells beats in both time and error, fastest first.
+
+        Those of other view cells take no part. Nor do those of a method that hides something visible at any setting: it
+        is not safe at the others either.
         """
         safe = (one for one in self.series if not one.apart and not any(p.wrong_hidden > 0 for p in one.points))
         points = (p for one in safe for p in one.points if p.seconds > 0 and not np.isnan(p.error))

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...data.errors import InputError
+from ...data.plural import counted
 from ...data.progress import phase, shown
 from ...data.store.view_cells import write_view_cells
 from ...verify.rays.witness import visible_rows, witnessed_objects
@@ -73,10 +74,10 @@ def sweep(bake_: "BakeFolder", *, cells: int = 8, seed: int = 0, progress: bool 
             chosen = np.sort(np.random.default_rng(seed).permutation(sources)[:cells])
             sweeper = _Sweeper(bake_, chosen, Path(name), seed)
             runs, drawn = chain(sweeper.runs(), sweeper.budgets(bake_)), sweeper.pixel_series()
-            size = f"{len(chosen)} view cells, {len(bake_.scene.objects):,} objects"
+            size = f"{counted(len(chosen), 'view cell')}, {counted(len(bake_.scene.objects), 'object')}"
         else:
             runs, drawn = _GraphSweeper(bake_, seed).runs(), None
-            size = f"{len(sources):,} inhabitable of {bake_.graph.cell_count:,} cells"
+            size = f"{len(sources):,} inhabitable of {counted(bake_.graph.cell_count, 'cell')}"
         found = []
         for run in runs:
             found.append(run)
@@ -136,8 +137,10 @@ class _Sweeper:
         boxes = whole.graph.cells[whole.graph.inhabitable].astype(np.int64)
         made = self._bake(boxes, Settings(method="occluders"))
         seen, most = witnessed_objects(made), _seconds(made)
+        prepare_s = made.manifest["seconds"]["prepare"]
         for share in SHARES:
-            early = self._bake(boxes, Settings(method="occluders"), max(share * most, 1e-3))
+            # A budget covers preparation, which is no part of what is drawn.
+            early = self._bake(boxes, Settings(method="occluders"), max(share * most, 1e-3) + prepare_s)
             potential = early.potential_objects
             yield _Run("occluders, all cells", "budget, share", share, _seconds(early), potential, seen, apart=True)
         yield _Run("occluders, all cells", "budget, share", 1.0, most, made.potential_objects, seen, apart=True)

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from textwrap import wrap
 
 from ...data.plausible import implausible
+from ...data.plural import counted
 from ...data.scene import Role
-from ...verify.check_result import counted
 from ..summary import KINDS, wall_words
 from .cells import CRACKS_M
 from .inspection import Inspection, Warning

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...data.carving import find_faces
 from ...data.errors import InputError
+from ...data.plural import counted
 from ...data.prepared import PreparedModel
 from ...data.scene import OPAQUE
 from ...data.store.bake_folder import read_bake
@@ -131,7 +132,8 @@ def _write(bake: "BakeFolder", chosen: dict[int, str], told: tuple[dict | None, 
     storeys = find_storeys(bake.graph, bake.grid_m) if speaks_of_cells(bake) else []
     lines += ["## Storeys", ""] if storeys else []
     for number, storey in enumerate(storeys):
-        title = f"Storey {number}: floor at {storey.floor * bake.grid_m:.2f} m, {len(storey.cells)} inhabitable cells"
+        cells = counted(len(storey.cells), "inhabitable cell")
+        title = f"Storey {number}: floor at {storey.floor * bake.grid_m:.2f} m, {cells}"
         painter.storey(storey, f"{name}, {title[0].lower()}{title[1:]}", folder / f"storey-{number}.png")
         lines += [f"### {title}", "", f"![{title}](storey-{number}.png)", "", STOREY_CAPTION, ""]
     lines += ["## Potentially visible sets", "", *_set_table(bake, chosen), ""]
@@ -170,7 +172,7 @@ def _draw_objects(bake: "BakeFolder", painter: Painter, shadows: _Shadows, cell:
     kinds = np.where(bake.potential_objects[cell], "unknown", "hidden")
     kinds[seen] = "seen"
     unknown, hidden = (int((kinds == kind).sum()) for kind in ("unknown", "hidden"))
-    title = f"View cell {cell}: {len(seen):,} objects seen, {unknown:,} unknown, {hidden:,} hidden"
+    title = f"View cell {cell}: {counted(len(seen), 'object')} seen, {unknown:,} unknown, {hidden:,} hidden"
     found = shadows.of(cell)
     painter.object_set(cell, kinds, found, lines, title, path)
     caption = (
@@ -178,7 +180,7 @@ def _draw_objects(bake: "BakeFolder", painter: Painter, shadows: _Shadows, cell:
         f"may be, grey ones are proved hidden. Green are the occluders as vLOD's method shrinks them for projection "
         f"points (crosses, one for each of six directions), {len(found[2]) - 1:,} in all: what they cover from such a "
         f"point is hidden from the whole cell. The bake itself proves more, without projection points. "
-        f"The {len(lines)} lines are sightlines to the largest objects seen."
+        f"Of the sightlines {len(lines)} are drawn, to the largest objects seen."
     )
     return title, caption
 
@@ -212,12 +214,12 @@ def _draw_set(bake: "BakeFolder", painter: Painter, storeys: list[Storey], cell:
         section = Section(2, (int(low) + int(high)) // 2 + 0.5)
     name = str(bake.graph.cell_names[cell])
     named = f"Cell {cell}{f' ({name})' if name else ''}"
-    title = f"{named}: {potential - unknown:,} cells seen, itself included, {unknown:,} unknown"
+    title = f"{named}: {counted(potential - unknown, 'cell')} seen, itself included, {unknown:,} unknown"
     painter.visible_set(cell, kinds, drawn, section, title, path)
     caption = (
         f"From the red cell one can see into every blue cell, and perhaps into the yellow ones ({unknown:,} in all); "
-        f"white cells are proved hidden. The {len(drawn)} lines are sightlines to the largest cells and objects seen; "
-        f"they are drawn whole, also where they run above or below the cut."
+        f"white cells are proved hidden. Of the sightlines {len(drawn)} are drawn, to the largest cells and objects "
+        f"seen, whole, also where they run above or below the cut."
     )
     return title, caption
 

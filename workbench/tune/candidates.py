@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from ...data.version import __version__
 from ..files import write_files
+from ..labels import place_labels
 from ..pages import COLOURS, MARKERS, html_page, pareto_front, png
 
 if TYPE_CHECKING:
@@ -49,7 +52,7 @@ def front_of(candidates: Sequence[Candidate]) -> list[Candidate]:
 
 def front_plot(candidates: Sequence[Candidate], chosen: Candidate | None, title: str, axes: tuple[str, str]) -> bytes:
     """PNG: error against time, one colour per kind, the Pareto front as a line, the chosen one in a ring."""
-    figure = Figure(figsize=(9.5, 6.0), layout="constrained")
+    figure = Figure(figsize=(11.5, 6.0), layout="constrained")
     ax = figure.subplots()
     kinds = list(dict.fromkeys(c.kind for c in candidates))
     for number, kind in enumerate(kinds):
@@ -62,36 +65,32 @@ def front_plot(candidates: Sequence[Candidate], chosen: Candidate | None, title:
     if chosen is not None:
         ring = {"marker": "o", "markersize": 17, "fillstyle": "none", "color": "black", "linestyle": ""}
         ax.plot([chosen.time], [chosen.error], label="recommended", **ring)
-    for number, c in enumerate(front, start=1):
-        ax.annotate(str(number), (c.time, c.error), (7, 6), textcoords="offset points", fontsize=9, weight="bold")
-    listed = "\n".join(f"{number}  {c.name}" for number, c in enumerate(front, start=1))
-    ax.text(0.985, 0.98, listed, transform=ax.transAxes, ha="right", va="top", fontsize=8, linespacing=1.5)
     ax.set(xscale="log", xlabel=axes[0], ylabel=axes[1])
     ax.grid(True, which="major", alpha=0.3)
     ax.set_title(title, fontsize=11)
     figure.legend(loc="outside lower center", ncols=min(5, len(kinds) + 2), fontsize=8, frameon=False)
+    # Beside the picture, where no point can lie under it.
+    listed = [Line2D([], [], linestyle="", label=f"{number}  {c.name}") for number, c in enumerate(front, start=1)]
+    figure.legend(handles=listed, loc="outside right upper", fontsize=8, frameon=False, handlelength=0)
+    place_labels(ax, [(c.time, c.error, str(number)) for number, c in enumerate(front, start=1)], weight="bold")
     return png(figure)
 
 
 def write_tune(
     folder: Path,
     tuned: str,
-    title: str,
-    candidates: Sequence[Candidate],
-    chosen: Candidate,
-    axes: tuple[str, str],
-    notes: Sequence[str],
+    page: tuple[str, tuple[str, ...], list[tuple[str, ...]], Sequence[str]],
+    picture: bytes,
+    content: dict[str, object],
 ) -> Path:
     """Write tune-X.json, .png and .html; each file appears whole or not at all.
 
     Args:
         folder: made if need be.
         tuned: X, what was tuned.
-        title: over picture and page.
-        candidates: all of them.
-        chosen: the recommended one.
-        axes: names of time and error.
-        notes: paragraphs of the page; one of several lines is shown as it is.
+        page: title, head and rows of the table, and paragraphs; one of several lines is shown as it is.
+        picture: PNG.
+        content: of the JSON file; what it `says` stands on its first line.
 
     Returns:
         Path of the JSON file, which `viewcell bake --settings` takes.
@@ -99,21 +98,14 @@ def write_tune(
     Raises:
         InputError: the folder cannot be written.
     """
-    picture = front_plot(candidates, chosen, title, axes)
-    head = ("setting", *axes, *candidates[0].numbers)
-    rows = [(c.name, f"{c.time:,.2f}", f"{c.error:,.4f}", *map(str, c.numbers.values())) for c in candidates]
-    content = {
-        "tuned": tuned,
-        "settings": chosen.settings or {},
-        "recommended": chosen.name,
-        "candidates": [
-            {"name": c.name, axes[0]: c.time, axes[1]: c.error, **c.numbers, "settings": c.settings} for c in candidates
-        ],
-    }
+    title, head, rows, notes = page
+    says = str(content["says"])
+    text = json.dumps({"says": says, "tuned": tuned, "viewcell": __version__} | content, indent=1, ensure_ascii=False)
     files = {
         f"tune-{tuned}.png": picture,
-        f"tune-{tuned}.html": html_page(title, picture, head, rows, notes).encode(),
-        f"tune-{tuned}.json": (json.dumps(content, indent=1) + "\n").encode(),
+        f"tune-{tuned}.html": html_page(title, picture, head, rows, notes, says).encode(),
+        # Whoever opens the file reads first what it does.
+        f"tune-{tuned}.json": (text.replace("{\n ", "{", 1) + "\n").encode(),
     }
     write_files(folder, lambda: files)
     return folder / f"tune-{tuned}.json"

@@ -11,6 +11,7 @@ import pyarrow.csv
 
 from ...data.camera import CameraPath, Screen
 from ...data.errors import InputError
+from ...data.plural import counted
 from ...data.progress import phase, shown
 from ...data.silence import silenced
 from ...data.store.bake_folder import BakeFolder
@@ -171,16 +172,17 @@ def _problem(
     levels = np.diff(tuples.starts)
     several = sum(len(shape.lods) > 1 for shape in bake.scene.definitions)
     notes = [
-        f"{len(path)} frames, {screen.width} x {screen.height} pixels; on average "
+        f"{counted(len(path), 'frame')}, {screen.width} x {screen.height} pixels; on average "
         f"{len(sightings.object_id) / len(path):.0f} objects in view, {levels[sightings.object_id].mean():.1f} choices "
         f"each, drawing nothing among them"
     ]
     if not several:
         notes.append("No object has more than one level: all that can be chosen is whether it is drawn.")
     if lost.any():
-        notes.append(f"{lost.sum()} eyes are in no inhabitable cell: every object may be seen from there.")
+        eyes = counted(int(lost.sum()), "eye")
+        notes.append(f"In no inhabitable cell: {eyes}. Every object may be seen from there.")
     if tuples.faceless:
-        notes.append(f"{tuples.faceless} objects have no faces: they are never drawn.")
+        notes.append(f"{counted(tuples.faceless, 'object')} without faces: never drawn.")
     if tuples.left_out:
         notes.append(f"{tuples.left_out} levels are left out: empty, or no cheaper than a finer one.")
     return _Problem(path, screen, tuples, sightings, candidates), notes

@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...data.errors import InputError
+from ...data.plural import counted
 from ...data.prepared import PreparedModel
 from ...data.progress import phase, shown
 from ...verify.rays.witness import witnessed_objects
-from .candidates import Candidate, default_out, front_of, write_tune
+from ..bake.blocks import BLOCK
+from .candidates import Candidate, default_out, front_of, front_plot, write_tune
 
 if TYPE_CHECKING:
     from ...data.store.bake_folder import BakeFolder
     from ...solvers.projection_point import Problem
     from ...solvers.result import Result
+    from ...solvers.visibility.engine import Engine
     from ...solvers.visibility.projection import VlodSettings
 
 # A setting that is faster is recommended if its overestimate is at most this much above the least.
@@ -26,6 +29,7 @@ CLUSTERS = (1, 6, 14, 26)
 RESOLUTIONS = (128, 256, 1024)
 # Of the search for the point that culls most: evaluations and starts a cluster.
 EVALUATIONS, STARTS = 25, 1
+AXES = "ms per view cell", "potential / seen"
 # Programmes that every solver is given, and those of them whose gap is proved in rationals.
 PROGRAMMES, PROVED = 200, 20
 
@@ -59,7 +63,9 @@ class PointTuning:
         folder: with tune.json, tune.png and tune.html.
         candidates: of settings; error is potential / seen.
         solvers: on the same programmes.
-        recommended: the candidate chosen.
+        recommended: the candidate chosen, of the published method's.
+        default: the candidate that is `bake`'s default method.
+        says: what the file does, and what the default would give.
         wrong_hidden: pairs hidden although they are seen: 0, or a bug.
     """
 
@@ -67,6 +73,8 @@ class PointTuning:
     candidates: list[Candidate]
     solvers: list[SolverRow]
     recommended: Candidate
+    default: Candidate
+    says: str
     wrong_hidden: int
 
 
@@ -120,29 +128,50 @@ def tune_projection_point(
         solvers = bench.solvers()
         bar.update()
     recommended = recommend([c for c in candidates if c.settings])
+    default = bench.default()
+    candidates.append(default)
     wrong = sum(int(c.numbers["wrong hidden"]) for c in candidates)
     folder = Path(out) if out else default_out(bake)
-    pixels = f"{len(chosen)} view cells, {len(scene.objects):,} objects, {len(model.outlines.area):,} occluders"
+    counts = (len(chosen), "view cell"), (len(scene.objects), "object"), (len(model.outlines.area), "occluder")
+    pixels = ", ".join(counted(*count) for count in counts)
     rule = (
-        f"Recommended: {recommended.name}, the fastest of those that `bake` can use whose overestimate is within "
-        f"{SLACK:.0%} of the least."
+        f"Recommended: {recommended.name}, the fastest of vLOD's settings that `bake` can use whose overestimate is "
+        f"within {SLACK:.0%} of the least of them. `viewcell tune MODEL` tunes the default method instead."
     )
+    says = _says(recommended, default, len(chosen))
+    title = f"Projection points of {Path(bake.folder).name}: {pixels}"
+    head = ("setting", *AXES, *candidates[0].numbers)
+    rows = [(c.name, f"{c.time:,.2f}", f"{c.error:,.4f}", *map(str, c.numbers.values())) for c in candidates]
+    listed = [
+        {"name": c.name, AXES[0]: c.time, AXES[1]: c.error, **c.numbers, "settings": c.settings} for c in candidates
+    ]
+    content = {
+        "says": says,
+        "settings": recommended.settings,
+        "recommended": recommended.name,
+        "default": next(row for row in listed if row["name"] == default.name),
+        "candidates": listed,
+    }
+    picture = front_plot(candidates, recommended, title, AXES)
     write_tune(
-        folder,
-        "projection-point",
-        f"Projection points of {Path(bake.folder).name}: {pixels}",
-        candidates,
-        recommended,
-        ("ms per view cell", "potential / seen"),
-        [rule, _note(wrong), "", _solver_table(solvers)],
+        folder, "projection-point", (title, head, rows, [rule, _note(wrong), _solver_table(solvers)]), picture, content
     )
-    return PointTuning(folder, candidates, solvers, recommended, wrong)
+    return PointTuning(folder, candidates, solvers, recommended, default, says, wrong)
 
 
 def recommend(candidates: list[Candidate]) -> Candidate:
     """The fastest whose error is within SLACK of the least; of equals the first."""
     least = min(c.error for c in candidates)
     return min((c for c in candidates if c.error <= least * (1 + SLACK)), key=lambda c: c.time)
+
+
+def _says(recommended: Candidate, default: Candidate, cells: int) -> str:
+    """What the file does, beside the default."""
+    return (
+        f"Changes the method to vlod ({recommended.name}). On {counted(cells, 'view cell')} it takes "
+        f"{recommended.time:,.1f} ms a cell and keeps {recommended.error:.3f} of what is seen; the default method "
+        f"takes {default.time:,.1f} ms, witnesses included, and keeps {default.error:.3f}."
+    )
 
 
 def _note(wrong: int) -> str:
@@ -159,6 +188,7 @@ class _Bench:
         self._triangles = model.scene.triangle_counts
         self._weights = (self._triangles / np.maximum(np.diff(occludees.starts), 1))[self._owners]
         self._seen = witnessed_objects(bake)[cells]
+        self._bake, self._cells, self._model = bake, cells, model
         self._problems: list[Problem] = []
 
     def warm(self, settings: "VlodSettings") -> None:
@@ -189,18 +219,13 @@ class _Bench:
             self._hidden(settings, self._keep, self._boxes)
         potential = ~hidden
         count = len(self._boxes)
-        clusters = "1 cluster" if settings.clusters == 1 else f"{settings.clusters} clusters"
-        name = f"{clusters}, {solver or settings.objective}, {settings.resolution} px"
+        name = f"{counted(settings.clusters, 'cluster')}, {solver or settings.objective}, {settings.resolution} px"
         return Candidate(
             name,
             solver or settings.objective,
             1e3 * seconds / count,
             float(potential.sum() / max(1, self._seen.sum())),
-            {
-                "solving, ms per cell": round(1e3 * solving / count, 2),
-                "culled triangles": f"{100 * (hidden @ self._triangles).sum() / (count * self._triangles.sum()):.1f} %",
-                "wrong hidden": int((hidden & self._seen).sum()),
-            },
+            self._numbers(hidden, solving),
             None
             if solver
             else {
@@ -210,6 +235,49 @@ class _Bench:
                 "resolution": settings.resolution,
             },
         )
+
+    def default(self) -> Candidate:
+        """The method that `bake` uses by default, from the same view cells; sightlines are sought, too."""
+        engine = self._default_engine()
+        blocks = [self._cells[first : first + BLOCK] for first in range(0, len(self._cells), BLOCK)]
+        # The first time makes, and compiles, what every time uses.
+        for _ in range(2):
+            begin = time.perf_counter()
+            parts = [engine.visible(block) for block in blocks]
+            seconds = time.perf_counter() - begin
+        potential = np.zeros((self._bake.graph.cell_count, len(self._triangles)), bool)
+        rows = engine.join(parts)[1]
+        potential[rows.source, rows.target] = True
+        hidden, count = ~potential[self._cells], len(self._cells)
+        error = float((~hidden).sum() / max(1, self._seen.sum()))
+        return Candidate(
+            "the default method",
+            "default",
+            1e3 * seconds / count,
+            error,
+            self._numbers(hidden, None),
+            {"method": "auto"},
+        )
+
+    def _default_engine(self) -> "Engine":
+        """An engine that answers from the bake's view cells."""
+        bake = self._bake
+        if bake.claims_cells:
+            from ...solvers.visibility.portal_engine import PortalEngine
+
+            return PortalEngine(self._model, bake.graph, method="auto", seed=self._seed)
+        from ...solvers.visibility.view_cell_engine import ViewCellEngine
+
+        return ViewCellEngine(self._model, bake.graph.cells, plans=bake.graph.plans, seed=self._seed)
+
+    def _numbers(self, hidden: np.ndarray, solving_s: float | None) -> dict[str, object]:
+        """Other columns of the table, from what is hidden, shape (view cells, objects), bool."""
+        count, sizes = len(hidden), self._triangles
+        return {
+            "solving, ms per cell": "-" if solving_s is None else round(1e3 * solving_s / count, 2),
+            "culled triangles": f"{100 * (hidden @ sizes).sum() / (count * sizes.sum()):.1f} %",
+            "wrong hidden": int((hidden & self._seen).sum()),
+        }
 
     def solvers(self) -> list[SolverRow]:
         """Every solver on the same programmes, those of 26 clusters."""
@@ -323,5 +391,6 @@ def point_lines(found: PointTuning) -> str:
             _solver_table(found.solvers),
             "",
             f"recommended: {found.recommended.name}; written to {found.folder}",
+            found.says,
         ]
     )

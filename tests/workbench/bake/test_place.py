@@ -68,7 +68,7 @@ def test_what_must_fail_fails_before_the_model_is_read(what, tmp_path, monkeypat
         out.mkdir()
         (out / "notes.txt").write_text("mine")
     before = sorted(tmp_path.rglob("*"))
-    monkeypatch.setattr(run, "_open", lambda *_: pytest.fail("the model was read"))
+    monkeypatch.setattr(run, "open_model", lambda *_: pytest.fail("the model was read"))
     with pytest.raises(InputError, match="expected"):
         viewcell.bake("model.ifc", out, settings=settings)
     assert sorted(tmp_path.rglob("*")) == before

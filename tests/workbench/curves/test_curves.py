@@ -10,8 +10,9 @@ from viewcell.workbench.bake.run import bake
 from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
+from viewcell.workbench.curves import plot as plots
 from viewcell.workbench.curves import sweep as sweeps
-from viewcell.workbench.curves.plot import write_curves
+from viewcell.workbench.curves.plot import curve_lines, curves_plot, write_curves
 from viewcell.workbench.curves.series import Curves, Point, Series, read_curves
 from viewcell.workbench.curves.sweep import sweep
 from viewcell.workbench.verify import seen_by_rays
@@ -100,7 +101,41 @@ def test_the_front_leaves_out_what_is_of_other_cells():
         Series("c", "k", [replace(better[0], wrong_hidden=1), *better]),
     )
     timeless = Series("d", "k", [replace(better[0], seconds=np.nan), replace(better[0], error=np.nan)])
-    assert Curves("", [Series("a", "k", points), apart, unsafe, timeless], 1).front == points[:2]
+    curves = Curves("", [Series("a", "k", points), apart, unsafe, timeless], 1)
+    assert curves.front == points[:2]
+    assert apart not in curves.compared and apart in curves.safe
+
+
+def drawn(curves, monkeypatch):
+    """Axes of the picture of some curves, by title."""
+    found = []
+    monkeypatch.setattr(plots, "png", lambda figure: found.append(figure) or b"")
+    curves_plot(curves)
+    return {axes.get_title().partition("\n")[0]: axes for axes in found[0].axes}
+
+
+def test_nothing_beats_the_front_in_the_panel_that_shows_it(monkeypatch):
+    """Points of other view cells, which would, have a panel of their own, without the front."""
+    slow = [Point(value, 2.0 + value, 1.5 - 0.1 * value, 0.0, 0) for value in (1.0, 2.0)]
+    better = [Point(value, 0.1, 1.01 + 0.1 * value, 0.0, 0) for value in (1.0, 2.0)]
+    panels = drawn(Curves("", [Series("a", "k", slow), Series("a", "smaller", better, apart=True)], 1), monkeypatch)
+    assert list(panels) == ["the same view cells: nothing visible is hidden", "other view cells: not to be compared"]
+    same, other = panels.values()
+    front = {line.get_label(): line for line in same.lines}["Pareto front of this panel"]
+    steps = list(zip(*front.get_data(), strict=True))
+    for line in same.lines:
+        for x, y in zip(*line.get_data(), strict=True):
+            assert not any(x < s and y < e for s, e in steps)
+    assert min(x for line in same.lines for x in line.get_xdata()) > 1 > max(x for x in other.lines[0].get_xdata())
+    assert len(other.lines) == 1
+    # Without such series there is no such panel.
+    assert len(drawn(Curves("", [Series("a", "k", slow)], 1), monkeypatch)) == 1
+
+
+def test_the_table_says_which_rows_are_of_other_view_cells():
+    points = [Point(1.0, 1.0, 1.5, 0.0, 0)]
+    said = curve_lines(Curves("o", [Series("a", "k", points), Series("b", "k", [replace(points[0])], apart=True)], 1))
+    assert "a, k *" in said and "b, k (other view cells)" in said
 
 
 def test_the_front_is_the_same_as_by_comparing_all_with_all():

@@ -1,5 +1,6 @@
 // Curves of time against error: their numbers, picture and table.
 import { $, make, shape, tableCell, tableRow } from "./dom.mjs";
+import { labelPlaces } from "./labels.mjs";
 
 const SERIES = ["#0072b2", "#d55e00", "#009e73", "#a8437c", "#555555", "#56b4e9"];
 // Marks of the series: corners about the middle [pixels]; the first is a circle.
@@ -8,7 +9,9 @@ const MARKS = ["", "-5,-5 5,-5 5,5 -5,5", "0,-7 6,5 -6,5", "0,-7 6,0 0,7 -6,0", 
 const PLOT = { width: 1000, height: 520, left: 76, right: 700, top: 16, bottom: 468 };
 // Halfway clear, for light and dark paper.
 const GRID = "#7b858f55";
-const HEAD = ["method", "knob", "value", "seconds", "error", "unknown", "wrong-hidden", "on the front"];
+// Of the values beside marks [pixels].
+const VALUE_SIZE = 11;
+const HEAD = ["method", "knob", "value", "seconds", "error", "unknown", "wrong-hidden", "on the front", "view cells"];
 // The error axis is logarithmic above 1; an exact result has a place on it all the same.
 const EXACT = 1e-4;
 
@@ -22,6 +25,9 @@ export function safeSeries(series) {
     .map((one) => ({ ...one, points: one.points.filter((p) => p.seconds > 0 && p.error !== null) }))
     .filter((one) => one.points.length);
 }
+
+/** Series of the same view cells, which the front speaks of, and those of others, which it cannot be compared with. */
+export const ofSameCells = (series) => [series.filter((one) => !one.apart), series.filter((one) => one.apart)];
 
 /** Points of the Pareto front, which the bake's own curves mark, fastest first. */
 export const frontOf = (series) =>
@@ -52,43 +58,57 @@ export function logAxis(values, from, to) {
 
 /** Shows the section of the curves, if anything can be drawn. */
 export function showCurves({ scene, series }) {
-  const safe = safeSeries(series);
+  const safe = safeSeries(series),
+    [same, others] = ofSameCells(safe);
   if (!safe.length) return;
   $("curves-section").hidden = $("curves-link").hidden = false;
   $("curves-about").textContent =
     `${scene}. Each mark is one setting of a knob, whose value stands beside it; to the left is ` +
-    "faster, further down is tighter. The thick black line is the Pareto front: no setting on this page is both " +
-    "faster and tighter. Methods that hide something visible are left out of the picture, and listed in the table.";
-  $("curves").append(curvePicture(safe), curveTable(series));
+    "faster, further down is tighter. The thick black line is the Pareto front: no setting in that picture is both " +
+    "faster and tighter. Methods that hide something visible are left out of the pictures, and listed in the table.";
+  const about = "Overestimate against seconds, with the Pareto front";
+  if (same.length) $("curves").append(curvePicture(same, safe, about));
+  if (others.length) {
+    const apart =
+      "The same from other view cells than the rest, smaller or more of them: each line is to be read by itself, and " +
+      "none takes part in the front.";
+    $("curves").append(make("p", { className: "quiet" }, apart), curvePicture(others, safe, "Other view cells"));
+  }
+  $("curves").append(curveTable(series));
 }
 
 const words = (x, y, text, more = {}) => shape("text", { x, y, ...more }, text);
 const rule = (x1, x2, y1, y2, stroke, more = {}) => shape("line", { x1, x2, y1, y2, stroke, ...more });
 
-function curvePicture(series) {
+/** A picture of some series; `safe` are all that are drawn, so that each keeps its colour and its mark. */
+function curvePicture(series, safe, about) {
   const { width, height, left, right, top, bottom } = PLOT,
     points = series.flatMap((one) => one.points),
     seconds = points.map((p) => p.seconds),
     across = logAxis(seconds, left, right),
-    up = logAxis(points.map(aboveOne), bottom, top);
+    up = logAxis(points.map(aboveOne), bottom, top),
+    front = frontOf(series);
   const at = (p) => [across.at(p.seconds), up.at(aboveOne(p))];
-  const about = "Overestimate against seconds, with the Pareto front";
   const svg = shape("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": about });
   drawAxes(svg, across, up);
-  const steps = frontOf(series).map((p, n) => (n ? `H${at(p)[0]}V${at(p)[1]}` : `M${at(p).join(" ")}`)).join("");
   const heavy = { fill: "none", stroke: "currentColor", "stroke-width": 3, "stroke-opacity": 0.8 };
-  svg.append(shape("path", { d: `${steps}H${right}`, ...heavy }));
-  const methods = [...new Set(series.map((one) => one.method))];
-  series.forEach((one, n) => {
-    const colour = SERIES[methods.indexOf(one.method) % SERIES.length];
-    const y = top + 16 + 34 * n;
+  const steps = front.map((p, n) => (n ? `H${at(p)[0]}V${at(p)[1]}` : `M${at(p).join(" ")}`)).join("");
+  if (front.length) svg.append(shape("path", { d: `${steps}H${right}`, ...heavy }));
+  const methods = [...new Set(safe.map((one) => one.method))];
+  series.forEach((one, place) => {
+    const n = safe.indexOf(one),
+      colour = SERIES[methods.indexOf(one.method) % SERIES.length];
+    const y = top + 16 + 34 * place;
     svg.append(curveMarks(one, n, colour, at), marker(n, right + 26, y, colour));
     svg.append(words(right + 40, y + 4, one.method));
     if (one.knob !== "no knob") svg.append(words(right + 40, y + 19, one.knob, { class: "knob" }));
   });
-  const y = top + 16 + 34 * series.length;
-  svg.append(rule(right + 16, right + 36, y, y, "currentColor", { "stroke-width": 3 }));
-  svg.append(words(right + 40, y + 4, "Pareto front"));
+  svg.append(valueLabels(series, at));
+  if (front.length) {
+    const y = top + 16 + 34 * series.length;
+    svg.append(rule(right + 16, right + 36, y, y, "currentColor", { "stroke-width": 3 }));
+    svg.append(words(right + 40, y + 4, "Pareto front"));
+  }
   return svg;
 }
 
@@ -96,16 +116,28 @@ function curvePicture(series) {
 function curveMarks(one, n, colour, at) {
   const points = [...one.points].sort((a, b) => a.value - b.value);
   const line = { fill: "none", stroke: colour, "stroke-width": 1.5, "stroke-opacity": 0.7 };
-  const group = shape("g", { class: "values" }, shape("polyline", { points: points.map(at).join(" "), ...line }));
+  const group = shape("g", {}, shape("polyline", { points: points.map(at).join(" "), ...line }));
   for (const p of points) {
-    const [x, y] = at(p);
-    const dot = marker(n, x, y, colour);
+    const dot = marker(n, ...at(p), colour);
     const numbers = `${p.seconds.toPrecision(3)} s, overestimate ${p.error.toFixed(4)}`;
     dot.append(shape("title", {}, `${one.method}, ${one.knob} ${p.value}: ${numbers}`));
     if (p.front) dot.setAttribute("class", "on-front");
     group.append(dot);
-    if (points.length > 1) group.append(words(x + 7, y - 6, String(p.value)));
   }
+  return group;
+}
+
+/** The knobs' values beside the marks, none over another. */
+function valueLabels(series, at) {
+  const group = shape("g", { class: "values" }),
+    { left, right, top, bottom } = PLOT;
+  const placed = ({ points }) => points.map((p) => ({ x: at(p)[0], y: at(p)[1], text: String(p.value) }));
+  const labels = series.filter((one) => one.points.length > 1).flatMap(placed),
+    marks = series.filter((one) => one.points.length === 1).flatMap(placed);
+  labelPlaces(labels, marks, [left, top, right, bottom], VALUE_SIZE).forEach(({ x, y, far }, n) => {
+    if (far) group.append(rule(labels[n].x, x, labels[n].y, y, GRID));
+    group.append(words(x, y + VALUE_SIZE / 3, labels[n].text, { "text-anchor": "middle" }));
+  });
   return group;
 }
 
@@ -146,7 +178,8 @@ function curveTable(series) {
       const unknown = p.unknown === null ? "" : `${(100 * p.unknown).toFixed(2)} %`;
       const values = [show(p.value), show(p.seconds), show(p.error), unknown, show(p.wrong_hidden, 9)];
       const names = [one.method, one.knob].map((text) => tableCell(text, { className: "text" }));
-      return tableRow(...names, ...[...values, p.front ? "yes" : ""].map((text) => tableCell(text)));
+      const places = [p.front ? "yes" : "", one.apart ? "others" : ""];
+      return tableRow(...names, ...[...values, ...places].map((text) => tableCell(text)));
     }),
   );
   const head = HEAD.map((word, n) => make("th", { scope: "col", className: n < 2 ? "text" : "" }, word));

@@ -1,7 +1,7 @@
 // The view cell and the chosen target in words and numbers.
 import { SEEN, UNKNOWN, WORD } from "./data.mjs";
 import { $, button, make, paragraph, tableCell } from "./dom.mjs";
-import { count, describe, label, nature, ratio, roomName, size } from "./words.mjs";
+import { count, counted, describe, label, nature, ratio, roomName, size } from "./words.mjs";
 
 const VERDICT = ["HIDDEN", "UNKNOWN", "VISIBLE", "NOT CLAIMED"];
 const REASON = [
@@ -46,7 +46,7 @@ export function roomFacts(bake, room) {
     one = cells.length === 1,
     numbers = [...cells.slice(0, NUMBERED), ...(cells.length > NUMBERED ? ["..."] : [])].join(", ");
   const words = [
-    `${count(cells.length)} view cell${one ? "" : "s"} (${numbers}) together`,
+    `${counted(cells.length, "view cell")} (${numbers}) together`,
     covered === null ? "" : `${one ? "it holds" : "they hold"} ${(100 * covered).toFixed(0)} % of where eyes may be in it`,
     elevation === null ? "" : `storey at ${elevation.toFixed(2)} m by the file`,
     guid,
@@ -174,7 +174,7 @@ function sightWords(state, target) {
     n = sight.portals.length;
   const parts = [paragraph("small", `Sightline of ${long.toFixed(2)} m from ${at(a)} to ${at(b)} m in the model's own coordinates.`)];
   if (target.kind !== "cell" || !n) return parts;
-  const path = paragraph("path", `Through ${n} portal${n === 1 ? "" : "s"}: cell ${cell}`);
+  const path = paragraph("path", `Through ${counted(n, "portal")}: cell ${cell}`);
   for (const { portal, cell: next } of pathOf(bake, cell, sight.portals))
     path.append(" → ", make("b", { title: `portal ${portal}` }, `portal ${portal}`), ` → cell ${next}`);
   return [...parts, path];

@@ -2,7 +2,7 @@
 import { WORD } from "./data.mjs";
 import { $, button, make, tableCell, tableRow } from "./dom.mjs";
 import { LISTED } from "./state.mjs";
-import { count, describe, label, nature, ratio } from "./words.mjs";
+import { count, counted, describe, label, nature, ratio } from "./words.mjs";
 
 const ROWS_SHOWN = 12;
 // Columns of the table of view cells; a first click on one of the latter four sorts the largest first.
@@ -101,7 +101,7 @@ export function sortedCells({ cells, relations, sources }, kind, { key, down }) 
 export function showWorst(state) {
   const rows = sortedCells(state.bake, state.worstKind, state.sort),
     most = Math.max(0, ...rows.map((r) => r.over - 1).filter(Number.isFinite)),
-    others = state.allCells ? `${ROWS_SHOWN} cells only` : `all ${count(rows.length)} cells`;
+    others = state.allCells ? `${ROWS_SHOWN} cells only` : `all ${counted(rows.length, "cell")}`;
   const meter = make("th", { className: "meter", "aria-hidden": "true" });
   $("worst").tHead.replaceChildren(tableRow(...COLUMNS.map((key, n) => heading(state, key, n > 2)), meter));
   const shown = state.allCells ? rows : rows.slice(0, ROWS_SHOWN);

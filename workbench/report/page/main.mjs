@@ -10,16 +10,16 @@ import { Plan } from "./plan.mjs";
 import { listenTo } from "./pointing.mjs";
 import { wireSearch } from "./search.mjs";
 import { LISTED, State } from "./state.mjs";
-import { count, label } from "./words.mjs";
+import { counted, label } from "./words.mjs";
 
 const KIND_WORD = { cell: "cells, all kinds", object: "objects" };
 
 function showHead({ cellCount, facts, objectCount, portals, sources }) {
   const shown = [
-    `${count(sources.length)} view cells`,
-    facts.claimsCells && `${count(cellCount)} cells in all`,
-    portals.axis.length && `${count(portals.axis.length)} portals`,
-    objectCount && `${count(objectCount)} objects`,
+    counted(sources.length, "view cell"),
+    facts.claimsCells && `${counted(cellCount, "cell")} in all`,
+    portals.axis.length && counted(portals.axis.length, "portal"),
+    objectCount && counted(objectCount, "object"),
   ];
   $("subtitle").textContent =
     `Potentially visible sets: ${shown.filter(Boolean).join(", ")}. viewcell ${facts.version}.`;
@@ -43,7 +43,7 @@ function wireTools(state) {
     { cells, kinds, level, sources, storeys } = bake;
   const choices = storeys.map(({ floor }, n) => {
     const own = sources.filter((cell) => cells.storey[cell] === n).length;
-    return [String(n), `${n}: floor at ${bake.metres(floor).toFixed(2)} m, ${count(own)} cells`];
+    return [String(n), `${n}: floor at ${bake.metres(floor).toFixed(2)} m, ${counted(own, "cell")}`];
   });
   offer($("storey"), choices, "0");
   $("storey").parentElement.firstChild.textContent = `${level} `;

@@ -1,6 +1,6 @@
 // Search over rooms, objects, their kinds and GUIDs.
 import { $, make } from "./dom.mjs";
-import { count, label, roomName } from "./words.mjs";
+import { count, counted, label, roomName } from "./words.mjs";
 
 const SHOWN = 40;
 
@@ -39,11 +39,11 @@ export function findWords(bake, { what, id }) {
   const { objects } = bake;
   if (what === "room") {
     const cells = bake.cellsOf(id).length;
-    return [`Room ${roomName(bake, id)}`, cells ? `${count(cells)} view cell${cells > 1 ? "s" : ""}` : "no view cell"];
+    return [`Room ${roomName(bake, id)}`, cells ? counted(cells, "view cell") : "no view cell"];
   }
   if (what === "kind") {
     const own = objects.kind.reduce((sum, kind) => sum + (kind === id), 0);
-    return [objects.kinds[id] || "no kind", `${count(own)} object${own === 1 ? "" : "s"}`];
+    return [objects.kinds[id] || "no kind", counted(own, "object")];
   }
   return [label(id, objects.names[id]), objects.kinds[objects.kind[id]]];
 }

@@ -5,6 +5,9 @@ const ROLE_WORD = ["occluder", "detail", "transparent"];
 /** A whole number with commas. */
 export const count = (n) => n.toLocaleString("en-US");
 
+/** A number of things, in words. */
+export const counted = (n, what) => `${count(n)} ${what}${n === 1 ? "" : "s"}`;
+
 /** An overestimate to three digits. */
 export const ratio = (over) => (Number.isFinite(over) ? over.toFixed(3) : "no witness");
 

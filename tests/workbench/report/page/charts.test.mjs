@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import { aboveOne, frontOf, logAxis, safeSeries, ticksBetween } from "../../../../workbench/report/page/charts.mjs";
+import { aboveOne, frontOf, logAxis, ofSameCells, safeSeries, ticksBetween } from "../../../../workbench/report/page/charts.mjs";
 
 const point = (seconds, error, more = {}) => ({ seconds, error, wrong_hidden: 0, ...more });
 
@@ -48,4 +48,9 @@ test("exact results have a place on the axis of overestimates", () => {
   assert.equal(aboveOne(point(1, 1)), 1e-4);
   assert.equal(aboveOne(point(1, 1.00001)), 1e-4);
   assert.equal(aboveOne(point(1, 1.5)), 0.5);
+});
+
+test("series of other view cells are apart from those that the front compares", () => {
+  const [same, old, other] = [{ method: "a", apart: false }, { method: "b" }, { method: "c", apart: true }];
+  assert.deepEqual(ofSameCells([other, same, old]), [[same, old], [other]]);
 });

@@ -6,6 +6,8 @@ import { chosen } from "./two_storeys.mjs";
 
 test("numbers in words", () => {
   assert.deepEqual([0, 999, 1234567].map(words.count), ["0", "999", "1,234,567"]);
+  const things = [0, 1, 2, 1000].map((n) => words.counted(n, "view cell"));
+  assert.deepEqual(things, ["0 view cells", "1 view cell", "2 view cells", "1,000 view cells"]);
   assert.deepEqual([1, 1.23456, Infinity].map(words.ratio), ["1.000", "1.235", "no witness"]);
   assert.equal(words.size(chosen().bake, [0, 10, 20, 15, 30, 50]), "1.50 × 2.00 × 3.00 m");
 });
