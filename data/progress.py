@@ -11,6 +11,8 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, TypeVar
 
+from .plural import counted
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
@@ -93,10 +95,14 @@ class Phase:
         """Name, what is done of what, since when, until when."""
         count = ""
         if self.unit and self.total:
-            count = f" {self.done:,.0f} of {self.total:,.0f} {plural(self.total, self.unit)} in"
+            count = f" {self.done:,.0f} of {self.units()} in"
         left = self.left_s
         more = f", about {left:,.0f} s left" if left and self.done < (self.total or 0) else ""
         return f"{self.name}:{count} {self.seconds:,.1f} s{more}{f' ({self.note})' if self.note else ''}"
+
+    def units(self) -> str:
+        """The total in words."""
+        return counted(round(self.total), self.unit, self.unit if self.unit == "%" else "")
 
     def end(self) -> None:
         """Say that it is over; once."""
@@ -171,7 +177,7 @@ def bars() -> "Progress":
         def render(self, task: Task) -> Text:
             shown = task.fields["phase"]
             known = shown.unit and shown.total
-            return Text(f"{shown.done:,.0f} of {shown.total:,.0f} {plural(shown.total, shown.unit)}" if known else "")
+            return Text(f"{shown.done:,.0f} of {shown.units()}" if known else "")
 
     class Left(ProgressColumn):
         def render(self, task: Task) -> Text:
@@ -201,8 +207,3 @@ def heartbeat() -> Iterator[None]:
     finally:
         over.set()
         thread.join()
-
-
-def plural(count: float, one: str) -> str:
-    """A unit as it is said of so many."""
-    return one if count == 1 or one.endswith("%") else f"{one}s"

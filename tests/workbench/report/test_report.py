@@ -178,7 +178,7 @@ def test_the_caption_and_the_table_agree(house, tmp_path):
     text = report(house, cells=[0], out=tmp_path).read_text()
     known = int(house.potential_cells[0].sum())
     assert f"{known} cells seen, itself included, 0 unknown" in text and f"| {known} | {known} | 1.000 | 0 |" in text
-    assert f"The {min(known - 1, SIGHTLINES_MOST['cell'])} lines" in text
+    assert f"Of the sightlines {min(known - 1, SIGHTLINES_MOST['cell'])} are drawn" in text
     assert "\n| cell 4 |" not in text
     rows = house.cell_to_cell.to_pylist()
     for row in rows:
