@@ -155,9 +155,14 @@ class CheckResult:
         lines += [f"- {self.describe(pair)}" for pair in widest[:shown]]
         return lines + ([f"- and {len(widest) - shown:,} more"] if len(widest) > shown else [])
 
+    def sightline(self, pair: WrongPair) -> tuple[np.ndarray, np.ndarray]:
+        """Both ends of a pair's sightline in the model's own place [m], 3 float64 each."""
+        start, end = (turned(end * self.grid_m, self.yaw_deg) + self.origin for end in (pair.origin, pair.end))
+        return start, end
+
     def describe(self, pair: WrongPair) -> str:
         """A wrong-hidden pair and its sightline in a line, in the model's own metres."""
-        start, stop = (turned(end * self.grid_m, self.yaw_deg) + self.origin for end in (pair.origin, pair.end))
+        start, stop = self.sightline(pair)
         way = stop - start
         length = float(np.linalg.norm(way))
         target = (

@@ -4,7 +4,6 @@ Nothing heavy is imported before it is needed: an argument that is wrong is refu
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Callable
 from dataclasses import fields
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..data.errors import InputError
 from ..data.plural import counted
+from .results import as_json, bake_result, check_result, verify_result
 from .summary import summary, table
 from .terminal import FAILED, INTERRUPTED, complain, say
 
@@ -78,12 +78,13 @@ def inspect(options: argparse.Namespace) -> int:
     if options.picture and Path(options.picture).suffix.lower() not in (".png", ".svg"):
         raise InputError(f"picture: expected a name ending in .png or .svg, found {options.picture!r}")
     found = look(options.model, referee=options.referee, estimate=not options.no_estimate, **_reading(options))
-    say(json.dumps(found.json(), indent=1, ensure_ascii=False) if options.json else found.text())
+    code = 0 if found.ok else FAILED
+    say(as_json("inspect", code, found.json()) if options.json else found.text())
     if options.picture:
         from .inspect.picture import draw
 
         draw(found, Path(options.picture))
-    return 0 if found.ok else FAILED
+    return code
 
 
 def bake(options: argparse.Namespace) -> int:
@@ -101,7 +102,7 @@ def bake(options: argparse.Namespace) -> int:
     if file.line:
         say(f"{options.settings}: {file.line}")
     out = Path(options.out) if options.out else default_out(model)
-    for folder in leftovers(out.absolute().parent, out.name):
+    for folder in [] if options.json else leftovers(out.absolute().parent, out.name):
         say(f"unfinished: {folder.name}; the bake that it is of goes on from there, viewcell clean removes it")
     before = _stamp(out)
     try:
@@ -118,9 +119,12 @@ def bake(options: argparse.Namespace) -> int:
     except Interrupted:
         complain("interrupted; the same command goes on from there")
         return INTERRUPTED
-    say(summary(made))
     # A bake that is written anew is a new folder.
     fresh = _stamp(out) != before
+    if options.json:
+        say(as_json("bake", 0, bake_result(made, fresh)))
+        return 0
+    say(summary(made))
     say(f"written to {made.folder}" if fresh else f"{made.folder} was up to date; --overwrite bakes it again")
     return 0
 
@@ -203,8 +207,9 @@ def verify(options: argparse.Namespace) -> int:
         say("\n".join([found.line(), *(f"refuted: {line}" for line in found.examples)]))
         return FAILED if found.failed else 0
     result = made.verify(rays=options.rays, seed=options.seed)
-    say(result.table())
-    return 0 if result.ok else FAILED
+    code = 0 if result.ok else FAILED
+    say(as_json("verify", code, verify_result(result)) if options.json else result.table())
+    return code
 
 
 def _hard_cases(options: argparse.Namespace) -> int:
@@ -241,11 +246,13 @@ def check(options: argparse.Namespace) -> int:
         targets=options.targets,
         **_reading(options),
     )
-    say(result.table(options.shown))
+    code = 0 if result.ok else FAILED
+    say(as_json("check", code, check_result(result)) if options.json else result.table(options.shown))
     if options.out:
         write_check(result, options.out)
-        say(f"written to {options.out}")
-    return 0 if result.ok else FAILED
+        if not options.json:
+            say(f"written to {options.out}")
+    return code
 
 
 def tune_bake(options: argparse.Namespace) -> int:
@@ -322,7 +329,8 @@ def report(options: argparse.Namespace) -> int:
     from .report.run import report as write
 
     text = write(made, cells=options.cells, out=options.out, curves=options.curves)
-    say(f"{text}\n{text.with_suffix('.html')}")
+    paths = {"text": str(text), "page": str(text.with_suffix(".html"))}
+    say(as_json("report", 0, paths) if options.json else "\n".join(paths.values()))
     return 0
 
 

@@ -19,7 +19,7 @@ write_graph, hashes = four_rooms.write_graph, four_rooms.hashes
 
 
 def run(*arguments, **options):
-    command = [sys.executable, "-m", "viewcell.workbench.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "viewcell", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, **options)
 
 
@@ -149,7 +149,7 @@ def test_up_and_unit_reach_the_reader(tmp_path, monkeypatch):
 
 
 def test_a_closed_pipe_is_quiet_and_keeps_the_exit_code(baked):
-    command = [sys.executable, "-m", "viewcell.workbench.cli", "verify", str(baked), "--rays", "1000"]
+    command = [sys.executable, "-m", "viewcell", "verify", str(baked), "--rays", "1000"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()
         assert (process.stderr.read(), process.wait(60)) == (b"", 0)

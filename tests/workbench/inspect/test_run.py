@@ -97,7 +97,7 @@ def test_the_command(tmp_path, capsys):
     assert main(["inspect", str(tmp_path / "rooms.scene"), "--no-estimate", "--picture", str(picture)]) == 0
     assert "fit to bake, but" in capsys.readouterr().out and picture.read_bytes()[:4] == b"\x89PNG"
     assert main(["inspect", str(tmp_path / "rooms.scene"), "--no-estimate", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["cracks"][0]["rooms"]
+    assert json.loads(capsys.readouterr().out)["result"]["cracks"][0]["rooms"]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,78 @@
+"""Options of what shows a bake, or hands it on."""
+
+import argparse
+
+from .common import add_seed, command, ids, whole
+
+
+def add_report(commands: argparse._SubParsersAction) -> None:
+    """`viewcell report`."""
+    report = command(
+        commands,
+        "report",
+        "report",
+        "Write plans, sets and numbers of a bake as a page.",
+        ["report house.bake", "report house.bake --cells 4,7 -o page"],
+        json=True,
+    )
+    report.add_argument("bake", metavar="BAKE", help="bake folder")
+    report.add_argument("--cells", type=ids, metavar="ID,ID", help="cells to show; three telling ones by default")
+    report.add_argument("-o", "--out", metavar="FOLDER", help="folder to write; BAKE/report by default")
+    report.add_argument(
+        "--curves", metavar="FILE", help="curves of time against error to show; FOLDER/curves.json by default"
+    )
+
+
+def add_curves(commands: argparse._SubParsersAction) -> None:
+    """`viewcell curves`."""
+    curves = command(
+        commands,
+        "curves",
+        "curves",
+        "Sweep every method's knob over a bake: time against error.",
+        ["curves house.bake", "curves --stability -o stability"],
+    )
+    curves.add_argument("bake", metavar="BAKE", nargs="?", help="bake folder; not with --stability")
+    curves.add_argument(
+        "--stability",
+        action="store_true",
+        help="instead, every kernel's error far from the origin, at slits, with thin occluders and close to edges",
+    )
+    curves.add_argument("--device", default="cpu", help="of --stability, such as cuda:0; cpu by default")
+    curves.add_argument("--cells", type=whole(1), default=8, help="view cells to sweep over; 8 by default")
+    curves.add_argument(
+        "-o",
+        "--out",
+        metavar="FOLDER",
+        help="folder for curves.json and .png; BAKE/report by default, where report finds them",
+    )
+    add_seed(curves, "the view cells and what the methods draw")
+
+
+def add_export(commands: argparse._SubParsersAction) -> None:
+    """`viewcell export`."""
+    export = command(
+        commands,
+        "export",
+        "export",
+        "Write a bake's model, sets or portals for engines and other tools.",
+        [
+            "export house.bake --glb house.glb --json house.json",
+            "export house.bake --3dtiles tiles",
+            "export house.bake --prt map.prt",
+        ],
+    )
+    export.add_argument("bake", metavar="BAKE", help="bake folder")
+    for kind, text in (
+        ("glb", "the model: a node for each object, with its id and GUID in extras"),
+        ("json", "view cells, rooms, objects and potentially visible sets"),
+        ("bits", "the sets as a bit matrix, and viewcell_bits.h beside it, which reads it from C"),
+        ("prt", "portal file PRT1 for a Quake-family vis, cells as leaves in order"),
+    ):
+        export.add_argument(f"--{kind}", metavar="FILE", help=text)
+    export.add_argument(
+        "--3dtiles",
+        metavar="FOLDER",
+        help="a tileset that shows to an eye in a view cell what it may see, and the same as a draft of glTF",
+    )
+    export.add_argument("--overwrite", action="store_true", help="replace what is there")
