@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-# Colours that colour-blind readers tell apart (Okabe and Ito).
-COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#cc79a7", "#555555")
+# Colours that colour-blind readers tell apart (after Okabe and Ito); the page has the same (report/page/charts.mjs).
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#a8437c", "#555555", "#56b4e9")
 MARKERS = ("o", "s", "^", "D", "P")
 Point = TypeVar("Point")
 

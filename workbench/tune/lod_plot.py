@@ -76,7 +76,7 @@ def _frame_times(axes: Axes, tuning: Tuning) -> None:
     for (name, times), colour in zip(tuning.modelled_ms.items(), ("#999999", COLOURS[0]), strict=False):
         axes.plot(times, color=colour, linewidth=1.3, label=name)
     target = tuning.budgets_ms[len(tuning.budgets_ms) // 2]
-    axes.axhline(target, color=COLOURS[2], linestyle="--", linewidth=1, label=f"target {target:.3g} ms")
+    axes.axhline(target, color=COLOURS[1], linestyle="--", linewidth=1, label=f"target {target:.3g} ms")
     axes.set(xlabel="frame of the path", ylabel="modelled frame time [ms]", ylim=(0, None))
     axes.set_title(f"frame time, {tuning.cost.renderer}", fontsize=10)
     axes.legend(fontsize=8, frameon=False)
