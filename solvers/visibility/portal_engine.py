@@ -10,6 +10,7 @@ from ...data.graph import CellGraph
 from ...data.incidence import populate
 from ...data.patches import Patches
 from ...data.prepared import PreparedModel
+from ...data.progress import phase
 from ...data.regions import Regions
 from ...data.rows import Rows
 from ...data.store.certificates import join_proofs
@@ -70,7 +71,10 @@ class PortalEngine:
     @cached_property
     def occluders(self) -> OccluderModel:
         """Occluders of the model, made when they are first asked."""
-        return OccluderModel.of(self._sights, frames=not self._certify)
+        # Once for all blocks: what takes them no longer says nothing of the rest.
+        with phase("occluders"):
+            wp.load_module(shaft.__name__, device=self.model.device.name)
+            return OccluderModel.of(self._sights, frames=not self._certify)
 
     def compile(self) -> None:
         """As of `Engine`."""
