@@ -8,7 +8,6 @@ import pyarrow.parquet as pq
 import pytest
 import viewcell
 from builders import four_rooms
-from builders.places import ROOT
 from viewcell.data.store.scene_folder import write_scene
 from viewcell.solvers.visibility.portal_engine import PortalEngine
 from viewcell.workbench.cli import main
@@ -211,15 +210,6 @@ def test_bakes_verify_themselves_and_subpackages_hide_no_function(baked):
         "assert callable(viewcell.bake) and callable(viewcell.report)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-
-def test_readme_example_prints_what_the_readme_says(tmp_path):
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    code = readme.partition("```python\n")[2].partition("```")[0]
-    expected = readme.partition("```text\n")[2].partition("```")[0]
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
-    # Warp greets on stdout before.
-    assert done.stdout.endswith(expected)
 
 
 def test_short_options_and_the_package_as_a_command(tmp_path, graph):

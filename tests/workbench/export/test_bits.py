@@ -1,10 +1,10 @@
 """The bit matrix, read by the C header that comes with it."""
 
-import re
 import subprocess
 
 import numpy as np
 import pytest
+from builders.pages import blocks
 from builders.places import ROOT
 from viewcell import InputError
 from viewcell.workbench.baked import load
@@ -82,8 +82,7 @@ def test_c_refuses_what_is_no_whole_file(program, tmp_path, damage):
 
 
 def test_the_guides_lines_of_c_compile(program):
-    page = (ROOT / "docs" / "guides" / "export.md").read_text(encoding="utf-8")
-    (lines,) = re.findall(r"^```c\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    (lines,) = blocks(ROOT / "docs/guides/export.md", "c")
     head = '#include "viewcell_bits.h"\nvoid draw(uint32_t);\nstruct point { double x, y, z; };\n'
     code = f"{head}int look(const void *data, uint64_t size, struct point eye) {{\n{lines}\nreturn 0; }}\n"
     command = ["cc", "-std=c99", "-Wall", "-Werror", "-fsyntax-only", "-xc", "-"]

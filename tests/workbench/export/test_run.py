@@ -1,10 +1,7 @@
 """Where exports go: nothing is replaced unasked, nothing is left half done."""
 
-import shutil
-
 import pytest
 from builders.four_rooms import hashes
-from builders.places import ROOT
 from viewcell import InputError
 from viewcell.workbench.bake.place import leftovers
 from viewcell.workbench.baked import load
@@ -93,16 +90,6 @@ def test_a_full_disk_leaves_what_was_there(house, tmp_path, monkeypatch):
     assert (
         len(left) == 1 and out.read_bytes() == b"mine" and [path.name for path in tmp_path.iterdir()] == ["house.json"]
     )
-
-
-def test_the_guides_commands_do_what_they_say(house, tmp_path, monkeypatch, capsys):
-    page = (ROOT / "docs" / "guides" / "export.md").read_text(encoding="utf-8")
-    lines = [line.partition("#")[0].split() for line in page.splitlines() if line.startswith("    viewcell export")]
-    shutil.copytree(house.folder, tmp_path / "house.bake")
-    monkeypatch.chdir(tmp_path)
-    assert [main(words[1:]) for words in lines] == [0] * 4
-    names = {f"house.{kind}" for kind in ("bake", "glb", "json", "bits", "tiles", "prt")}
-    assert {path.name for path in tmp_path.iterdir()} == names | {"viewcell_bits.h"}
 
 
 def test_editors_complete_what_can_be_exported():
