@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: install run test test-slow mutants lint clean
+.PHONY: install run test test-slow mutants lint docs clean
 
 install: .venv/installed
 
@@ -36,6 +36,10 @@ mutants: install
 lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+# The site, with a link or anchor that leads nowhere as an error: out/docs/index.html.
+docs: install
+	$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs out/docs
 
 clean:
 	rm -rf .venv out build dist *.egg-info
