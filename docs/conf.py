@@ -3,6 +3,8 @@
 project = "viewcell"
 copyright = "The viewcell authors"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_argparse_cli"]
+# In docstrings, as in pages, backticks are code.
+default_role = "code"
 html_theme = "furo"
 html_title = "viewcell"
 exclude_patterns = ["bench/*.json"]
