@@ -1,8 +1,8 @@
 """Pages of the documentation: their blocks, in order, and a reader who does what they say.
 
-In a `console` block a line that begins with "$ " is a command; what follows is what it prints, where "..." stands for
-anything; nothing, if the page does not say. A `python` block runs after those before it; a `text` block right after it
-is what it prints. One whose first line is "# NAME.py" is a file.
+In a `console` block a line that begins with "$ " is a command, and "# exit 1" at its end the exit code. What follows is
+what it prints, where "..." stands for anything; nothing, if the page does not say. A `python` block runs after those
+before it; a `text` block right after it is what it prints. One whose first line is "# NAME.py" is a file.
 """
 
 import doctest
@@ -20,6 +20,7 @@ from viewcell.workbench.cli import main
 
 FENCE = re.compile(r"^```(\S*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"# (\w+\.py)\n")
+EXIT = re.compile(r"# exit (\d+)\s*$")
 
 
 def blocks(page: Path, kind: str | None = None) -> list[tuple[str, str]] | list[str]:
@@ -51,7 +52,9 @@ def follow(page: Path) -> dict[str, object]:
     for (kind, text), (after, told) in pairwise([*found, ("", "")]):
         if kind == "console":
             for command, printed in commands(text):
-                _compare(command, printed, _run(shlex.split(command, comments=True)))
+                code = EXIT.search(command)
+                said = _run(shlex.split(command, comments=True), int(code[1]) if code else 0)
+                _compare(command, printed, said)
         elif kind == "python" and (file := FILE.match(text)):
             Path(file[1]).write_text(text, encoding="utf-8")
         elif kind == "python":
@@ -61,15 +64,15 @@ def follow(page: Path) -> dict[str, object]:
     return names
 
 
-def _run(words: list[str]) -> str:
+def _run(words: list[str], wanted: int) -> str:
     if words[0] == "viewcell":
         with redirect_stdout(io.StringIO()) as said, redirect_stderr(io.StringIO()) as complained:
             code = main(words[1:])
-        assert code == 0, f"{shlex.join(words)}: exit {code}\n{said.getvalue()}{complained.getvalue()}"
+        assert code == wanted, f"{shlex.join(words)}: exit {code}\n{said.getvalue()}{complained.getvalue()}"
         return said.getvalue()
     assert words[0] == "pytest", f"{words[0]}: no reader knows how to run it"
     done = subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.returncode == wanted, done.stdout + done.stderr
     return done.stdout
 
 
