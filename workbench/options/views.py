@@ -69,7 +69,8 @@ def add_export(commands: argparse._SubParsersAction) -> None:
         ("bits", "the sets as a bit matrix, and viewcell_bits.h beside it, which reads it from C"),
         ("prt", "portal file PRT1 for a Quake-family vis, cells as leaves in order"),
     ):
-        export.add_argument(f"--{kind}", metavar="FILE", help=text)
+        # Said, lest that of `command`'s own --json, False, be it.
+        export.add_argument(f"--{kind}", metavar="FILE", default=None, help=text)
     export.add_argument(
         "--3dtiles",
         metavar="FOLDER",
