@@ -153,21 +153,6 @@ def quantised(v: wp.vec3d) -> wp.vec3d:
     return wp.vec3d(wp.round(v[0] * QUANTUM), wp.round(v[1] * QUANTUM), wp.round(v[2] * QUANTUM)) / QUANTUM
 
 
-@wp.kernel
-def _confirm(
-    scene: Triangles,
-    origins: wp.array[wp.vec3d],
-    ends: wp.array[wp.vec3d],
-    except_owner: wp.array[int],
-    first: int,
-    clear_out: wp.array[wp.uint8],
-):
-    row = first + wp.tid()
-    clear_out[row] = wp.uint8(0)
-    if obstacle(scene, origins[row], ends[row], except_owner[row]) < 0:
-        clear_out[row] = wp.uint8(1)
-
-
 @wp.func
 def point_at(lo: wp.vec3d, hi: wp.vec3d, share: wp.vec3d) -> wp.vec3d:
     """Point of a box at shares 0 to 1 of its sides, kept off its faces by 1/64 of its size."""
@@ -343,6 +328,29 @@ def surely_hits(targets: AimTargets, aim: Aim) -> bool:
 
 
 @wp.kernel
+def _confirm(
+    scene: Triangles,
+    targets: AimTargets,
+    origins: wp.array[wp.vec3d],
+    ends: wp.array[wp.vec3d],
+    except_owner: wp.array[int],
+    on: wp.array[wp.vec2i],
+    first: int,
+    clear_out: wp.array[wp.uint8],
+):
+    row = first + wp.tid()
+    aim = Aim(origins[row], ends[row], on[row][0], wp.uint32(0))
+    # An empty range asks for no target.
+    met = bool(on[row][0] == on[row][1])
+    while not met and aim.triangle < on[row][1]:
+        met = surely_hits(targets, aim)
+        aim.triangle += 1
+    if met:
+        met = obstacle(scene, aim.origin, aim.end, except_owner[row]) < 0
+    clear_out[row] = wp.uint8(met)
+
+
+@wp.kernel
 def _aim(
     scene: Triangles,
     targets: AimTargets,
@@ -390,15 +398,24 @@ def _aim(
 
 
 def launch_confirm(
-    scene: Triangles, origins: np.ndarray, ends: np.ndarray, owners: np.ndarray, *, device: Device = CPU
+    scene: Triangles,
+    origins: np.ndarray,
+    ends: np.ndarray,
+    owners: np.ndarray,
+    *,
+    targets: "AimTargets | None" = None,
+    ranges: np.ndarray | None = None,
+    device: Device = CPU,
 ) -> np.ndarray:
-    """Sightlines that certainly clear every opaque triangle.
+    """Sightlines that certainly clear every opaque triangle, and hit a target, if there is one.
 
     Args:
         scene: opaque triangles.
         origins: [grid steps], shape (n, 3), float64.
         ends: likewise.
         owners: object whose triangles are no obstacle (the target), or -1, shape (n,), int.
+        targets: triangles of all objects, with `ranges`.
+        ranges: first and past-the-last triangle of each row's target, one of which the sightline has to hit.
         device: where to.
 
     Returns:
@@ -411,7 +428,9 @@ def launch_confirm(
     check_coordinates(ends)
     clear = device.zeros(len(origins), wp.uint8)
     lines = [device.array(points, wp.vec3d) for points in (origins, ends)]
-    launch_rows(_confirm, len(origins), [scene, *lines, device.array(owners, int)], [clear], device)
+    on = device.array(np.zeros((len(origins), 2)) if ranges is None else ranges, wp.vec2i)
+    asked = [scene, targets or AimTargets(), *lines, device.array(owners, int), on]
+    launch_rows(_confirm, len(origins), asked, [clear], device)
     return clear.numpy().astype(bool)
 
 

@@ -24,6 +24,7 @@ from .engine import Part, join_objects, unknown_rows
 from .ledger import Ledger
 from .objects import object_rows
 from .occluders import OccluderModel, hidden_boxes, refine_objects, seen_objects
+from .shared import share_sightlines
 
 # With "auto" the occluders are asked about cells of whose potential objects more than this share is unknown.
 AUTO_UNKNOWN = 0.02
@@ -135,4 +136,6 @@ class PortalEngine:
 
     def join(self, parts: list[Part]) -> tuple[Rows, Rows]:
         """As of `Engine`; cells are made symmetric: A sees B exactly when B sees A."""
-        return join_cell_rows(self.model, [part.cells for part in parts]), join_objects(parts)
+        objects = join_objects(parts)
+        share_sightlines(self._sights, objects)
+        return join_cell_rows(self.model, [part.cells for part in parts]), objects

@@ -19,6 +19,7 @@ from .engine import Part, join_objects, unknown_rows
 from .ledger import Ledger
 from .occluders import OccluderModel, look_at_objects, seen_objects
 from .projection import VlodSettings, vlod_hidden
+from .shared import share_sightlines
 
 
 class ViewCellEngine:
@@ -98,4 +99,6 @@ class ViewCellEngine:
 
     def join(self, parts: list[Part]) -> tuple[None, Rows]:
         """As of `Engine`; nothing is claimed of cells."""
-        return None, join_objects(parts)
+        objects = join_objects(parts)
+        share_sightlines(self.model.sights, objects)
+        return None, objects

@@ -292,6 +292,8 @@ def _visibility(
     if sources.octree:
         parts, unrefined = refine(sources, work, parts, settings)
         short = short or unrefined
+        # Rows speak of the cells that are left.
+        engine = engine.from_cells(sources.graph.cells)
     clock.lap("flood")
     tables = {}
     if settings.certify:
