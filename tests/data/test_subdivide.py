@@ -347,7 +347,7 @@ def test_inhabitable_by_rooms():
     graph = room_graph(scene)
     found = find_inhabitable(scene, graph)
     np.testing.assert_array_equal(graph.cells[found.mask], [[(0, 0, 0), (4 * METRE, 4 * METRE, 3 * METRE)]])
-    assert found.names[found.mask].tolist() == ["room 0"] and "rooms" in found.reason
+    assert found.names[found.mask].tolist() == ["room 0"] and "1 room" in found.reason
 
 
 def bare_graph(cells):

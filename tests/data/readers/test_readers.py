@@ -269,7 +269,7 @@ def test_one_bad_part_is_skipped_and_listed(tmp_path):
     assert scene.skipped == [
         {"what": "bad", "why": "Mesh: a coordinate is not finite"},
         {"what": "flat", "why": "Mesh: no area on the grid"},
-        {"what": "1 triangles", "why": "no area on the grid"},
+        {"what": "1 triangle", "why": "no area on the grid"},
     ]
 
 
