@@ -191,7 +191,8 @@ def refine(
     """Replace cells of an octree that may see too much, or know too little, by their octants, level by level.
 
     Returns:
-        Parts of the cells that are left, which `sources` has then; and what the deadline left of a level, if anything.
+        Parts of the cells that are left, which `sources` and the work's engine have then; and what the deadline left of
+        a level, if anything.
     """
     model, engine = sources.model, work.engine
     sizes, cells = model.scene.triangle_counts, sources.graph.cells
@@ -227,6 +228,7 @@ def refine(
         if not count:
             break
     sources.graph = as_graph(np.concatenate(leaves))
+    work.engine = engine.from_cells(sources.graph.cells)
     return kept, short
 
 

@@ -292,8 +292,6 @@ def _visibility(
     if sources.octree:
         parts, unrefined = refine(sources, work, parts, settings)
         short = short or unrefined
-        # Rows speak of the cells that are left.
-        engine = engine.from_cells(sources.graph.cells)
     clock.lap("flood")
     tables = {}
     if settings.certify:
@@ -302,7 +300,7 @@ def _visibility(
         sources.facts["counts"] = sources.facts["counts"] | {"proofs": len(proofs.cell)}
         sources.facts["certificate_s"] = round(proofs.seconds, 3)
         clock.lap("certificates")
-    return *engine.join(parts), tables, short
+    return *work.engine.join(parts), tables, short
 
 
 def _triangle_counts(model: PreparedModel, graph: CellGraph, rows: Rows, device: "Device") -> dict[str, int]:

@@ -131,6 +131,7 @@ def run_trial(
         with tempfile.TemporaryDirectory() as scratch, phase("octree", 0, "cell") as bar:
             work = Work(engine, Store(Path(scratch)), bar, clock.deadline, clock.start)
             parts, short = refine(sources, work, parts, settings)
+            engine = work.engine
         clock.add(0)
         if short is not None:
             return Trial(prepared_s + clock.all_s, None)

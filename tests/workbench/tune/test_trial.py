@@ -43,6 +43,19 @@ def test_an_octree_s_sample_holds_nothing_else(scene):
     assert sources.graph.inhabitable.all() and left == every.cell_count - sources.graph.cell_count > 0
 
 
+def test_an_octree_that_is_refined_answers_as_a_bake_does(scene, tmp_path):
+    """Rows are of the cells that are left, whose witnesses serve each other."""
+    settings = Settings(
+        method="occluders", cells="octree", cell_size_m=4.0, depth=1, refine_gap=0.01, refine_triangles=10
+    )
+    made = bake(scene, tmp_path / "o.bake", settings=settings, threads=1)
+    answer = run_trial(scene, settings, WHERE).answer
+    assert np.array_equal(answer.potential, made.potential_objects)
+    assert answer.graph.cell_count > sources_of(scene, settings)[0].graph.cell_count
+    assert np.array_equal(answer.objects.seen, np.array(made.cell_to_object["verdict"].to_pylist()) == "visible")
+    assert made.verify(rays=20_000).ok
+
+
 def test_what_takes_too_long_is_stopped(scene):
     assert run_trial(scene, Settings(), WHERE, most_s=1e-9).answer is not None  # one block: nothing later to judge by
     cells = sources_of(scene, Settings())[0].graph
