@@ -241,12 +241,12 @@ def _plan_points(triangles: np.ndarray, rectangle: np.ndarray, yaw_deg: float) -
     flat, own = flat[near], triangles[near].reshape(-1, 3)[:, :2].astype(float)
     inside = ((flat >= low) & (flat <= high)).all(axis=2).ravel()
     crossings = []
-    a, edges = flat, np.roll(flat, -1, axis=1) - flat
+    edges = np.roll(flat, -1, axis=1) - flat
     for axis in (0, 1):
         for border in (low[axis], high[axis]):
             rise = edges[:, :, axis]
-            share = np.divide(border - a[:, :, axis], rise, out=np.full(rise.shape, -1.0), where=rise != 0)
-            point = a + share[:, :, None] * edges
+            share = np.divide(border - flat[:, :, axis], rise, out=np.full(rise.shape, -1.0), where=rise != 0)
+            point = flat + share[:, :, None] * edges
             held = (share >= 0) & (share <= 1) & (point >= low - 1).all(axis=2) & (point <= high + 1).all(axis=2)
             crossings.append(point[held])
     # Corners of the rectangle that a triangle lies under or over.

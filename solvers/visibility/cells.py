@@ -17,7 +17,7 @@ from ...kernels.target import TargetAnswers, launch_target_search
 from ...kernels.trace import launch_trace
 from .aim import Sights, middles, seeds
 from .ledger import Ledger, descend
-from .search import search_rounds, segments
+from .search import on_witness_grid, search_rounds, segments
 
 # Sightlines per round aimed at a pair that the axial model allows but whose own line the true triangles block.
 AIM_ROUNDS = (16, 64, 256)
@@ -137,7 +137,7 @@ def _jitter(model: CellModel, rows: Rows) -> None:
         moved = []
         for point, cell in ((rows.origin[todo], cells[source]), (rows.end[todo], cells[target])):
             reach = (cell[:, 1] - cell[:, 0]) * 0.5**power
-            moved.append(np.round((point + random.uniform(-1.0, 1.0, point.shape) * reach) * 1024.0) / 1024.0)
+            moved.append(on_witness_grid(point + random.uniform(-1.0, 1.0, point.shape) * reach))
         good = accept(model, source, target, *moved)
         rows.show(todo[good], moved[0][good], moved[1][good])
 
@@ -227,7 +227,7 @@ def _with_own(model: CellModel, sources: np.ndarray, rows: Rows) -> Rows:
     """Add each source as its own target, seen if a free point was found in it, and order the rows."""
     own = Rows.unseen(sources, sources)
     cells = model.graph.cells[sources].astype(float)
-    start = np.round(cells.mean(axis=1) * 1024.0) / 1024.0
+    start = on_witness_grid(cells.mean(axis=1))
     good = accept(model, sources, sources, start, start + SHORT)
     own.origin[:], own.end[:] = start, start + SHORT
     own.show(good, start[good], start[good] + SHORT)
@@ -236,7 +236,7 @@ def _with_own(model: CellModel, sources: np.ndarray, rows: Rows) -> Rows:
         random = np.random.default_rng(model.seed)
         for row in np.flatnonzero(~good):
             points = cells[row, 0] + random.uniform(0.05, 0.95, (64, 3)) * (cells[row, 1] - cells[row, 0])
-            points = np.round(points * 1024.0) / 1024.0
+            points = on_witness_grid(points)
             repeated = np.full(64, sources[row])
             free = np.flatnonzero(accept(model, repeated, repeated, points, points + SHORT))
             if len(free):

@@ -26,6 +26,11 @@ def search_rounds(tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, device
     return answers
 
 
+def on_witness_grid(points: np.ndarray) -> np.ndarray:
+    """Nearest points whose coordinates are multiples of 2**-10 grid steps, as ends of witnesses are."""
+    return np.round(points * 1024.0) / 1024.0
+
+
 def segments(
     answers: TargetAnswers, rows: np.ndarray, sources: np.ndarray, targets: np.ndarray, plans: Plans = NO_PLANS
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -51,7 +56,7 @@ def segments(
         return np.maximum.reduce(low.T), np.minimum.reduce(high.T)
 
     def place(time: np.ndarray) -> np.ndarray:
-        return np.round(sign * (time[:, None] + xi) / w * 1024.0) / 1024.0
+        return on_witness_grid(sign * (time[:, None] + xi) / w)
 
     enter, leave = times(sources)
     # Inside the plan of a prism from the last of its sides that leads in to the first that leads out.

@@ -11,6 +11,7 @@ from ...data.ragged import places_of
 from ...data.rows import Rows
 from ...kernels.sightline import launch_confirm
 from .aim import Sights
+from .search import on_witness_grid
 
 # Witnesses of an object that are tried, evenly spread over its cells, and pairs with one that are looked at together.
 LINES, CHUNK = 64, 1 << 20
@@ -19,7 +20,6 @@ LINES, CHUNK = 64, 1 << 20
 TRIES, SHARES = 6, (0.9, 0.5, 0.1)
 # What was found serves once more.
 ROUNDS = 2
-QUANTUM = 1024.0
 
 
 def share_sightlines(sights: Sights, rows: Rows) -> None:
@@ -97,8 +97,7 @@ def _try(sights: Sights, rows: Rows, pair: np.ndarray, line: np.ndarray, span: n
         return
     time = span[:, 0] + share * (span[:, 1] - span[:, 0])
     end = rows.end[line]
-    origin = rows.origin[line] + time[:, None] * (end - rows.origin[line])
-    origin = np.round(origin * QUANTUM) / QUANTUM
+    origin = on_witness_grid(rows.origin[line] + time[:, None] * (end - rows.origin[line]))
     box = sights.cells[rows.source[pair]]
     inside = ((origin > box[:, 0]) & (origin < box[:, 1])).all(axis=1)
     pair, origin, end = pair[inside], origin[inside], end[inside]

@@ -2,7 +2,18 @@
 
 import argparse
 
-from .common import Help, add_numbers, add_seed, add_settings, command, image_size, number, several_numbers, whole
+from .common import (
+    Help,
+    add_device,
+    add_numbers,
+    add_seed,
+    add_settings,
+    command,
+    image_size,
+    number,
+    several_numbers,
+    whole,
+)
 
 
 def add_bake(commands: argparse._SubParsersAction) -> None:
@@ -30,7 +41,7 @@ def add_bake(commands: argparse._SubParsersAction) -> None:
         "--budget", type=number, metavar="SECONDS", help="stop refining then; the rest is unknown, never hidden"
     )
     bake.add_argument("--threads", type=whole(1), help="CPU threads; all cores by default")
-    bake.add_argument("--device", default="cpu", help="Warp device, such as cuda:0; cpu by default")
+    add_device(bake)
     bake.add_argument(
         "--overwrite", action="store_true", help="bake again, even if BAKE is up to date or of something else"
     )
@@ -71,7 +82,7 @@ def add_tune_bake(solvers: argparse._SubParsersAction) -> None:
         help="about how long it may take, without reading; 300 by default. Fewer view cells are tried if it is short",
     )
     bake.add_argument("--threads", type=whole(1), help="CPU threads; all cores by default")
-    bake.add_argument("--device", default="cpu", help="Warp device, such as cuda:0; cpu by default")
+    add_device(bake)
     add_numbers(bake)
     add_settings(bake.add_argument_group("settings that are kept as you give them"))
 

@@ -2,7 +2,7 @@
 
 import argparse
 
-from .common import add_numbers, add_roles, add_seed, command, whole
+from .common import add_device, add_numbers, add_roles, add_seed, command, whole
 
 
 def add_verify(commands: argparse._SubParsersAction) -> None:
@@ -89,7 +89,7 @@ def add_bench(commands: argparse._SubParsersAction) -> None:
         default="quick",
         help="quick, the default: a minute or so; full: larger sizes, and how cost grows",
     )
-    bench.add_argument("--device", default="cpu", help="Warp device, such as cuda:0; cpu by default")
+    add_device(bench)
     bench.add_argument("--json", metavar="FILE", help="where to write the rows")
     bench.add_argument("--against", metavar="FILE", help="rows of an earlier run: say what got slower or looser")
     bench.add_argument("--strict", action="store_true", help="fail if anything got slower or looser, or is missing")

@@ -119,6 +119,11 @@ def completed(parser: argparse.ArgumentParser) -> None:
             action.complete = shtab.DIRECTORY
 
 
+def add_device(parser: argparse.ArgumentParser) -> None:
+    """Where kernels run."""
+    parser.add_argument("--device", default="cpu", help="Warp device, such as cuda:0; cpu by default")
+
+
 def add_seed(parser: argparse.ArgumentParser, of: str) -> None:
     """The seed of what a command draws."""
     parser.add_argument("--seed", type=whole(0, SEED_LIMIT - 1), default=0, help=f"of {of}; 0 by default")
