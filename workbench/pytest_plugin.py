@@ -52,7 +52,9 @@ def viewcell_scene(request: pytest.FixtureRequest) -> "Scene":
     try:
         return read(option or request.config.rootpath / ini)
     except InputError as error:
-        pytest.fail(str(error), pytrace=False)
+        fault = str(error)
+    # Outside the handler, or pytest says it twice, the second time as what happened during the first.
+    pytest.fail(fault, pytrace=False)
 
 
 class ShortNames:
