@@ -9,8 +9,11 @@ from ...data.prepared import PreparedModel
 from ...data.rows import Rows
 from ...data.scene import OPAQUE
 from ...data.solids import SolidIndex
+from ...kernels.aim import launch_aim
 from ...kernels.launch import Device
-from ...kernels.sightline import AimTargets, Triangles, aim_targets, device_triangles, launch_aim, launch_confirm
+from ...kernels.sightline import Triangles, device_triangles, launch_confirm
+from .finder import Finder
+from .first_hits import FirstHits
 
 # Sightlines aimed at each object before anything is proved: most visible objects fall to the first few; then at each
 # that is left, round by round.
@@ -25,24 +28,24 @@ class Sights:
     Attributes:
         model: the model.
         cells: view cells [grid steps], shape (cells, 2, 3), int32; they may overlap each other and solids.
-        triangles: opaque ones.
-        targets: triangles of all objects.
-        ranges: first and past-the-last triangle of each object among the targets, shape (objects, 2).
+        triangles: of all objects.
+        ranges: first and past-the-last triangle of each object, shape (objects, 2).
         solids: closed elements by view cell.
         plans: of view cells that stand at an angle: eyes are inside them.
         seed: of the random sightlines.
-        device: that holds triangles and targets.
+        device: that holds the triangles.
+        finder: of sightlines that may be clear; a GPU confirms all as fast.
     """
 
     model: PreparedModel
     cells: np.ndarray
     triangles: Triangles
-    targets: AimTargets
     ranges: np.ndarray
     solids: SolidIndex
     plans: Plans
     seed: int
     device: Device
+    finder: Finder | None
 
     @classmethod
     def of(
@@ -50,10 +53,12 @@ class Sights:
     ) -> "Sights":
         """Copy a model's triangles to the device."""
         scene, starts = model.scene, model.scene.triangle_starts
-        triangles = device_triangles(*scene.triangles(*OPAQUE), device)
         ranges, solids = np.column_stack([starts[:-1], starts[1:]]), SolidIndex(cells, model.closed)
-        targets = aim_targets(scene.triangles()[0], device)
-        return cls(model, cells, triangles, targets, ranges, solids, plans, seed, device)
+        everything, owners = scene.triangles()
+        opaque = scene.object_mask(*OPAQUE)[owners]
+        triangles = device_triangles(everything, owners, device, opaque=opaque)
+        finder = Finder(everything, owners, opaque, device.threads) if device.is_cpu else None
+        return cls(model, cells, triangles, ranges, solids, plans, seed, device, finder)
 
     def from_cells(self, cells: np.ndarray) -> "Sights":
         """The same from other view cells, which stand along the axes."""
@@ -100,9 +105,9 @@ class Sights:
         if not len(pairs):
             return
         source, target = rows.source[pairs], rows.target[pairs]
+        guide = None if self.finder is None else FirstHits(self.finder, rows, pairs, self._serve)
         found, origin, end = launch_aim(
             self.triangles,
-            self.targets,
             self.cells[source],
             boxes,
             hints,
@@ -112,11 +117,21 @@ class Sights:
             tries=tries,
             boxed=number > 0,
             plans=self.plans.take(source, len(self.cells)),
+            guide=guide,
             device=self.device,
         )
-        good = np.flatnonzero(found)
-        good = good[self.outside(source[good], origin[good])]
+        self._show(rows, pairs[found], origin[found], end[found])
+
+    def _show(self, rows: Rows, pairs: np.ndarray, origin: np.ndarray, end: np.ndarray) -> None:
+        """Show pairs by clear sightlines, those that start at an eye, in place."""
+        good = np.flatnonzero(self.outside(rows.source[pairs], origin))
         rows.show(pairs[good], origin[good], end[good])
+
+    def _serve(self, rows: Rows, pairs: np.ndarray, triangle: np.ndarray, origin: np.ndarray, end: np.ndarray) -> None:
+        """Show pairs by sightlines to triangles of their objects, where those are clear, in place."""
+        options = {"ranges": triangle[:, None] + [0, 1], "device": self.device}
+        good = launch_confirm(self.triangles, origin, end, rows.target[pairs], **options)
+        self._show(rows, pairs[good], origin[good], end[good])
 
 
 def seeds(seed: int | np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:

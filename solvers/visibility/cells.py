@@ -9,10 +9,10 @@ from ...data.graph import CellGraph
 from ...data.hierarchy import build_levels
 from ...data.rows import Rows
 from ...data.verdict import Verdict
+from ...kernels.aim import launch_aim
 from ...kernels.blockers import blocker_tree
 from ...kernels.graph import device_graph
 from ...kernels.launch import CPU, Device
-from ...kernels.sightline import launch_aim
 from ...kernels.target import TargetAnswers, launch_target_search
 from ...kernels.trace import launch_trace
 from .aim import Sights, middles, seeds
@@ -207,7 +207,6 @@ def _aim(model: CellModel, rows: Rows, aim_rounds: tuple[int, ...]) -> None:
         hints[hintless] = middles(cells[source], cells[target])[hintless]
         found, first, last = launch_aim(
             sights.triangles,
-            sights.targets,
             cells[source],
             cells[target],
             hints,
@@ -215,6 +214,7 @@ def _aim(model: CellModel, rows: Rows, aim_rounds: tuple[int, ...]) -> None:
             seeds(model.seed + number + 1000 * copy, source, target),
             ~refused[todo],
             tries=tries,
+            guide=sights.finder,
             device=model.device,
         )
         hit = np.flatnonzero(found)

@@ -14,7 +14,7 @@ from ...data.progress import phase
 from ...data.regions import Regions
 from ...data.rows import Rows
 from ...data.store.certificates import join_proofs
-from ...kernels import line_tree, shaft, sightline, target, trace
+from ...kernels import aim, line_tree, shaft, sightline, target, trace
 from ...kernels.launch import CPU, Device
 from . import aim as aiming
 from . import cells as cell_search
@@ -79,7 +79,7 @@ class PortalEngine:
 
     def compile(self) -> None:
         """As of `Engine`."""
-        modules = [target, trace, sightline]
+        modules = [target, trace, sightline, aim]
         if self._least_unknown == 0.0 or self._certify:
             modules.append(shaft)
         if self._certify:

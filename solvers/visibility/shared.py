@@ -102,7 +102,7 @@ def _try(sights: Sights, rows: Rows, pair: np.ndarray, line: np.ndarray, span: n
     inside = ((origin > box[:, 0]) & (origin < box[:, 1])).all(axis=1)
     pair, origin, end = pair[inside], origin[inside], end[inside]
     target = rows.target[pair]
-    options = {"targets": sights.targets, "ranges": sights.ranges[target], "device": sights.device}
+    options = {"ranges": sights.ranges[target], "device": sights.device}
     good = np.flatnonzero(launch_confirm(sights.triangles, origin, end, target, **options))
     good = good[sights.outside(rows.source[pair[good]], origin[good])]
     rows.show(pair[good], origin[good], end[good])

@@ -12,7 +12,7 @@ from ...data.plans import NO_PLANS, Plans
 from ...data.prepared import PreparedModel
 from ...data.regions import Regions
 from ...data.rows import Rows
-from ...kernels import line_tree, shaft, sightline, target
+from ...kernels import aim, line_tree, shaft, sightline, target
 from ...kernels.launch import CPU, Device
 from .aim import AIM_ROUNDS, Sights
 from .engine import Part, join_objects, unknown_rows
@@ -73,7 +73,7 @@ class ViewCellEngine:
 
     def compile(self) -> None:
         """As of `Engine`."""
-        for module in (target, shaft, sightline, *([line_tree] if self._certify else [])):
+        for module in (target, shaft, sightline, aim, *([line_tree] if self._certify else [])):
             wp.load_module(module.__name__, device=self.model.sights.device.name)
 
     def visible(self, block: np.ndarray, *, aim: bool = True) -> Part:

@@ -111,3 +111,12 @@ def two_solids():
     """Two solids and a room between them."""
     parts = [([0, 0, 0], [99, 2000, 2000]), ([999, 0, 0], [1999] * 3)]
     return scene_of([(box_triangles(*part), "occluder") for part in parts], [((100, 0, 0), (999, 1999, 1999))])
+
+
+def clutter(seed, count=30, size=1000):
+    """Triangles of boxes and tetrahedra with their owners."""
+    rng = np.random.default_rng(seed)
+    parts = [tetrahedron(rng.integers(0, size, (4, 3))) for _ in range(count // 2)]
+    parts += [box_triangles(low, low + rng.integers(5, 200, 3)) for low in rng.integers(0, size, (count // 2, 3))]
+    owners = np.repeat(np.arange(len(parts)), [len(part) for part in parts]).astype(np.int32)
+    return np.concatenate(parts).astype(np.int32), owners

@@ -13,7 +13,7 @@ TWINS = {
     "launch_target_search": ("target", "exact.stab.stab", "kernels/test_flood.py"),
     "launch_line_trees": ("line_tree", "proofs.line_tree.hides", "verify/proofs/test_line_tree.py"),
     "launch_confirm": ("sightline", "exact.sightline.Sightlines", "kernels/test_sightline.py"),
-    "launch_aim": ("sightline", "exact.sightline.Sightlines", "kernels/test_sightline.py"),
+    "launch_aim": ("aim", "exact.sightline.Sightlines", "kernels/test_aim.py"),
     "launch_trace": ("trace", "exact.trace.portal_path", "kernels/test_trace.py"),
     "launch_shaft": ("shaft", "exact.umbra.hides", "kernels/test_shaft.py"),
     "launch_coverage": ("coverage", "exact.coverage.cover_polygon", "kernels/test_coverage.py"),
@@ -26,9 +26,9 @@ TWINS = {
     "launch_raster": ("raster", "exact.raster.first_hit", "kernels/test_raster.py"),
 }
 # Kernels that answer another file's question in their own way have its twin: `stab_batch` is the plain stab, both
-# searches ask for pairs joined by a stabbing line (builders/random_buildings.py searches with the exact stab), and a
-# shaft that is not halved is blocked by one occluder iff the box lies in its umbra.
-QUESTIONS = {"stab_batch": "stab", "flood": "stab", "target": "stab", "shaft": "umbra"}
+# searches ask for pairs joined by a stabbing line (builders/random_buildings.py searches with the exact stab), aiming
+# gives sightlines, and a shaft that is not halved is blocked by one occluder iff the box lies in its umbra.
+QUESTIONS = {"stab_batch": "stab", "aim": "sightline", "flood": "stab", "target": "stab", "shaft": "umbra"}
 
 
 def launchers():

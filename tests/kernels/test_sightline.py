@@ -1,10 +1,9 @@
-"""Confirming and aiming of sightlines on the device, against the exact check."""
+"""Confirming of sightlines on the device, against the exact check."""
 
 import numpy as np
 import pytest
 from builders import random_buildings
-from viewcell.kernels.launch import CPU, Device
-from viewcell.kernels.sightline import aim_targets, device_triangles, launch_aim, launch_confirm
+from viewcell.kernels.sightline import device_triangles, launch_confirm
 from viewcell.verify.exact.sightline import Sight, Sightlines
 
 NOBODY = -1
@@ -16,18 +15,6 @@ def spread(triangles, rng):
     if rng.random() < 0.5:
         return (triangles - triangles.min()) * (2 * LIMIT // np.ptp(triangles)) - LIMIT
     return triangles + rng.choice([-1, 1], 3) * (LIMIT - np.abs(triangles).max())
-
-
-def clutter(seed, count=30, size=1000):
-    """Triangles of boxes and tetrahedra with their owners."""
-    rng = np.random.default_rng(seed)
-    parts = [random_buildings.tetrahedron(rng.integers(0, size, (4, 3))) for _ in range(count // 2)]
-    parts += [
-        random_buildings.box_triangles(low, low + rng.integers(5, 200, 3))
-        for low in rng.integers(0, size, (count // 2, 3))
-    ]
-    owners = np.repeat(np.arange(len(parts)), [len(part) for part in parts]).astype(np.int32)
-    return np.concatenate(parts).astype(np.int32), owners
 
 
 def edge_segments(triangles, rng, count):
@@ -42,7 +29,7 @@ def edge_segments(triangles, rng, count):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_confirmed_is_never_wrong(seed):
-    triangles, owners = clutter(seed)
+    triangles, owners = random_buildings.clutter(seed)
     rng = np.random.default_rng(seed)
     scene, exact = device_triangles(triangles, owners), Sightlines(triangles, owners)
     random = rng.uniform(0, 1000, (2, 3000, 3))
@@ -78,7 +65,7 @@ def check_skimming(seeds, count):
     found = clear = 0
     for seed in seeds:
         rng = np.random.default_rng(seed)
-        triangles, owners = clutter(seed)
+        triangles, owners = random_buildings.clutter(seed)
         triangles = spread(triangles, rng)
         origins, ends = skimming(triangles, rng, count)
         got = launch_confirm(device_triangles(triangles, owners), origins, ends, np.full(len(origins), NOBODY))
@@ -108,7 +95,7 @@ def test_a_segment_in_the_plane_of_a_triangle_is_not_clear_of_it():
 
 
 def test_the_target_itself_is_no_obstacle():
-    triangles, owners = clutter(9)
+    triangles, owners = random_buildings.clutter(9)
     rng = np.random.default_rng(9)
     origins, ends = rng.uniform(0, 1000, (2, 2000, 3))
     scene = device_triangles(triangles, owners)
@@ -119,71 +106,3 @@ def test_the_target_itself_is_no_obstacle():
         rest = Sightlines(triangles[owners != owner], owners[owners != owner])
         assert not (got[rows] & (rest.check(origins[rows], ends[rows]) != Sight.CLEAR)).any()
     assert got.sum() > launch_confirm(scene, origins, ends, np.full(2000, NOBODY)).sum()
-
-
-def crumbs(seed, count=100, size=400):
-    """Tetrahedra of a step or two, with their owners."""
-    rng = np.random.default_rng(seed)
-    parts = []
-    while len(parts) < count:
-        corners = rng.integers(0, size, 3) + rng.integers(0, 4, (4, 3))
-        if np.linalg.det((corners[1:] - corners[0]).astype(float)):
-            parts.append(random_buildings.tetrahedron(corners))
-    return np.concatenate(parts).astype(np.int32), np.repeat(np.arange(count), 4).astype(np.int32)
-
-
-def aimed(seed, at_objects, device=CPU, far=False, tiny=False):
-    """Aim from boxes at boxes, or at objects: the work and what was found."""
-    triangles, owners = crumbs(seed) if tiny else clutter(seed)
-    rng = np.random.default_rng(seed)
-    away = (LIMIT - triangles.max()) * np.array([1, -1, 1]) if far else 0
-    triangles = (triangles + away).astype(np.int32)
-    low, size = away + rng.integers(0, 390 if tiny else 900, (2, 1500, 3)), (1, 3) if tiny else (10, 100)
-    sources, boxes = (np.stack([x, x + rng.integers(*size, x.shape)], axis=1).astype(np.int32) for x in low)
-    hints = np.stack([sources.mean(axis=1), boxes.mean(axis=1)], axis=1)
-    starts = np.searchsorted(owners, np.arange(owners.max() + 2))
-    objects = rng.integers(0, owners.max() + 1, 1500) if at_objects else np.full(1500, NOBODY)
-    ranges = np.column_stack([starts[objects], starts[objects + 1]]) if at_objects else np.zeros((1500, 2), int)
-    found = launch_aim(
-        device_triangles(triangles, owners), aim_targets(triangles), sources, boxes, hints,
-        np.column_stack([objects, ranges]),        np.arange(1500), np.arange(1500) % 2 == 0, tries=20, device=device,
-    )  # fmt: skip
-    return triangles, owners, sources, boxes, objects, found
-
-
-PLACES = {"near": {}, "far": {"far": True}, "tiny": {"tiny": True}, "tiny and far": {"tiny": True, "far": True}}
-
-
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("seed", range(3))
-def test_aimed_sightlines_are_clear_and_start_and_end_where_they_should(seed, place):
-    triangles, owners, sources, boxes, _, (found, origins, ends) = aimed(seed, at_objects=False, **PLACES[place])
-    assert 100 < found.sum() <= 1500
-    for points, limits in ((origins, sources), (ends, boxes)):
-        # A witness starts and ends inside.
-        assert ((points > limits[:, 0]) & (points < limits[:, 1]))[found].all()
-        np.testing.assert_array_equal(points[found] * 1024, np.round(points[found] * 1024))
-    assert (Sightlines(triangles, owners).check(origins[found], ends[found]) == Sight.CLEAR).all()
-
-
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("seed", range(3))
-def test_sightlines_aimed_at_objects_end_on_them(seed, place):
-    triangles, owners, sources, _, objects, (found, origins, ends) = aimed(seed, at_objects=True, **PLACES[place])
-    assert 100 < found.sum() <= 1500
-    assert ((origins > sources[:, 0]) & (origins < sources[:, 1]))[found].all()
-    for owner in np.unique(objects[found]):
-        rows = found & (objects == owner)
-        mine = owners == owner
-        rest = Sightlines(triangles[~mine], owners[~mine])
-        assert (rest.check(origins[rows], ends[rows]) == Sight.CLEAR).all()
-        # Prolonged a little, the sightline meets the object.
-        further = origins[rows] + (ends[rows] - origins[rows]) * 1.0005
-        assert (Sightlines(triangles[mine], owners[mine]).check(origins[rows], further) != Sight.CLEAR).all()
-
-
-@pytest.mark.parametrize("at_objects", [False, True])
-def test_threads_change_nothing(at_objects):
-    one, two = (aimed(4, at_objects, Device(threads=threads))[-1] for threads in (1, 2))
-    for got, wanted in zip(two, one, strict=True):
-        np.testing.assert_array_equal(got, wanted)

@@ -10,11 +10,12 @@ from ...data.graph import CellGraph
 from ...data.hierarchy import build_hierarchy
 from ...data.scene import GRID_LIMIT
 from ...data.verdict import Verdict
+from ...kernels.aim import launch_aim
 from ...kernels.blockers import BlockerTree, blocker_tree
 from ...kernels.flood import launch_flood
 from ...kernels.launch import Device
 from ...kernels.line_tree import launch_line_trees
-from ...kernels.sightline import aim_targets, device_triangles, launch_aim, launch_confirm
+from ...kernels.sightline import device_triangles, launch_confirm
 from ...kernels.stab_batch import launch_stab
 from ...kernels.target import launch_target_search
 from ...kernels.trace import launch_trace
@@ -203,7 +204,6 @@ def aim(cases: HardCases, device: Device) -> Outcomes:
         spots = np.repeat(ends[:, None, None], 2, axis=2).astype(np.int32)
         found, *_ = launch_aim(
             scene,
-            aim_targets(triangles, device),
             *spots,
             ends[None],
             np.array([[-1, 0, 0]]),

@@ -91,14 +91,16 @@ def test_projection_points_hide_nothing_seen_and_less_than_occluders(office, cel
     assert made.verify(rays=100_000).ok
 
 
-def test_both_on_portal_cells_hides_no_less_and_sees_no_less(tmp_path):
+def test_both_on_portal_cells_hides_no_less_and_sees_as_much(tmp_path):
     scene = make_office(floors=1, rooms_per_side=2)
     portals, both = (
         bake(scene, tmp_path / f"{method}.bake", settings=Settings(method=method)) for method in ("portals", "both")
     )
     assert not (both.potential_objects & ~portals.potential_objects).any()
     assert not (both.potential_cells & ~portals.potential_cells).any()
-    assert both.manifest["counts"]["object_pairs_seen"] >= portals.manifest["counts"]["object_pairs_seen"]
+    # Each aims at its own parts of what it could not hide, at random: a pair may be found by one only.
+    seen = [bake.manifest["counts"]["object_pairs_seen"] for bake in (both, portals)]
+    assert abs(seen[0] - seen[1]) < 0.005 * seen[1]
     assert both.verify(rays=100_000).ok
 
 
