@@ -7,6 +7,7 @@ import numpy as np
 from ...data.blockers import Blockers
 from ...data.graph import CellGraph
 from ...data.hierarchy import build_levels
+from ...data.ragged import places_of
 from ...data.rows import Rows
 from ...data.verdict import Verdict
 from ...kernels.aim import launch_aim
@@ -68,6 +69,38 @@ def certified_pairs(model: CellModel, sources: np.ndarray, ledger: Ledger) -> np
     return pairs[pairs[:, 0] != pairs[:, 1]]
 
 
+def search_outwards(model: CellModel, sources: np.ndarray) -> tuple[np.ndarray, TargetAnswers]:
+    """Pairs with a cell that a portal joins to one that is not hidden, and the answers of the search; ordered.
+
+    A line past all blockers leaves every cell through a portal, so what it reaches lies beside what it passed, which it
+    reaches as well. All pairs that are left out are hidden.
+
+    Returns:
+        (source, other cell), shape (n, 2), int64, and their answers.
+    """
+    starts, entries = model.graph.adjacency()
+    count, own = model.graph.cell_count, np.arange(len(sources))
+    asked = np.zeros((len(sources), count), bool)
+    asked[own, sources] = True
+    row, cell = own, np.asarray(sources)
+    found = []
+    while len(row):
+        sizes = (starts[1:] - starts[:-1])[cell]
+        beside = entries[places_of(starts[cell], sizes), 1]
+        row, cell = np.divmod(np.unique(np.repeat(row, sizes) * count + beside), count)
+        fresh = ~asked[row, cell]
+        row, cell = row[fresh], cell[fresh]
+        asked[row, cell] = True
+        pairs = np.column_stack([sources[row], cell])
+        answers = search_pairs(model, pairs, None)
+        found.append((row * count + cell, pairs, *vars(answers).values()))
+        left = answers.verdict != Verdict.HIDDEN
+        row, cell = row[left], cell[left]
+    key, pairs, *columns = (np.concatenate(column) for column in zip(*found, strict=True))
+    order = np.argsort(key)
+    return pairs[order], TargetAnswers(*(column[order] for column in columns))
+
+
 def search_pairs(model: CellModel, pairs: np.ndarray, ledger: Ledger | None) -> TargetAnswers:
     """Target search from cell to cell, row by row."""
     rows = np.column_stack([pairs, np.zeros(len(pairs), int)])
@@ -94,11 +127,11 @@ def cell_rows(
     """
     cells = model.graph.cells
     if ledger is None:
-        pairs = np.stack(np.meshgrid(sources, np.arange(len(cells)), indexing="ij"), axis=-1).reshape(-1, 2)
-        pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+        pairs, answers = search_outwards(model, sources)
     else:
+        # Walls, whose proofs anybody can check, say nothing of portals.
         pairs = certified_pairs(model, sources, ledger)
-    answers = search_pairs(model, pairs, ledger)
+        answers = search_pairs(model, pairs, ledger)
     kept = np.flatnonzero(answers.verdict != Verdict.HIDDEN)
     rows = Rows.unseen(*pairs[kept].T)
     lined = np.flatnonzero(answers.verdict[kept] == Verdict.VISIBLE)
