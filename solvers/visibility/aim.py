@@ -19,6 +19,8 @@ from .first_hits import FirstHits
 # that is left, round by round.
 FIRST_TRIES = 12
 AIM_ROUNDS = (32, 128, 512)
+# An object with so many parts that could not be hidden is not looked at further: they are enough to aim at.
+OPEN_ENOUGH = 3
 
 
 @dataclass
@@ -52,11 +54,12 @@ class Sights:
         cls, model: PreparedModel, cells: np.ndarray, seed: int, device: Device, plans: Plans = NO_PLANS
     ) -> "Sights":
         """Copy a model's triangles to the device."""
-        scene, starts = model.scene, model.scene.triangle_starts
-        ranges, solids = np.column_stack([starts[:-1], starts[1:]]), SolidIndex(cells, model.closed)
+        scene = model.scene
         everything, owners = scene.triangles()
         opaque = scene.object_mask(*OPAQUE)[owners]
         triangles = device_triangles(everything, owners, device, opaque=opaque)
+        starts = np.searchsorted(owners, np.arange(len(scene.objects) + 1))
+        ranges, solids = np.column_stack([starts[:-1], starts[1:]]), SolidIndex(cells, model.closed)
         finder = Finder(everything, owners, opaque, device.threads) if device.is_cpu else None
         return cls(model, cells, triangles, ranges, solids, plans, seed, device, finder)
 

@@ -13,7 +13,7 @@ from ...data.incidence import Incidence
 from ...data.ragged import places_of
 from ...data.rows import Rows
 from ...data.verdict import Verdict
-from .aim import AIM_ROUNDS, FIRST_TRIES, middles
+from .aim import AIM_ROUNDS, FIRST_TRIES, OPEN_ENOUGH, middles
 from .cells import CellModel
 from .search import search_rounds, segments
 
@@ -64,29 +64,47 @@ def _prove(
     part_source: np.ndarray,
     pair_of: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Try to hide every part of the pairs that are not seen.
+    """Try to hide the parts of the pairs that are not seen, a few at a time, until some of a pair are not hidden.
 
     Returns:
-        Which pairs stay potential, bool; and for every part that could not be hidden the ends of a line to it, shape
+        Which pairs stay potential, bool; and of every part that could not be hidden the ends of a line to it, shape
         (n, 2, 3), its row in the incidence, and its pair.
     """
-    cells = model.graph.cells
-    todo = np.flatnonzero(~rows.seen[pair_of])
-    own = incidence.cell[parts[todo]] == part_source[todo]
+    order = np.argsort(pair_of, kind="stable")
+    starts = np.searchsorted(pair_of[order], np.arange(len(rows) + 1))
+    pairs = np.flatnonzero(~rows.seen)
+    first, last = starts[pairs], starts[pairs + 1]
+    open_parts, step = np.zeros(len(pairs), int), 1
+    found = [(np.zeros(0, int), np.zeros((0, 2, 3)))]
+    while len(active := np.flatnonzero((first < last) & (open_parts < OPEN_ENOUGH))):
+        sizes = np.minimum(step, last[active] - first[active])
+        at, place = np.repeat(active, sizes), order[places_of(first[active], sizes)]
+        left, hints = _prove_parts(model, incidence, parts[place], part_source[place])
+        found.append((place[left], hints))
+        np.add.at(open_parts, at[left], 1)
+        first[active] += sizes
+        step *= 2
+    place, hints = (np.concatenate(column) for column in zip(*found, strict=True))
     potential = np.zeros(len(rows), bool)
-    potential[pair_of[todo[own]]] = True
-    kept_own = todo[own]
-    todo = todo[~own]
-    todo = todo[~potential[pair_of[todo]]]
-    boxes = np.concatenate([cells, incidence.boxes[parts[todo]]])
-    work = np.column_stack([part_source[todo], len(cells) + np.arange(len(todo)), np.ones(len(todo), int)])
+    potential[pair_of[place]] = True
+    return potential, hints, parts[place], pair_of[place]
+
+
+def _prove_parts(
+    model: CellModel, incidence: Incidence, parts: np.ndarray, source: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which parts could not be hidden from the cell of their row, as rows, and a line to each, shape (n, 2, 3)."""
+    cells, part_boxes = model.graph.cells, incidence.boxes[parts]
+    own = incidence.cell[parts] == source
+    todo = np.flatnonzero(~own)
+    boxes = np.concatenate([cells, part_boxes[todo]])
+    work = np.column_stack([source[todo], len(cells) + np.arange(len(todo)), np.ones(len(todo), int)])
     answers = search_rounds(model.tree, boxes, work, model.device)
-    left = np.flatnonzero(answers.verdict != Verdict.HIDDEN)
-    potential[pair_of[todo[left]]] = True
-    kept = np.concatenate([kept_own, todo[left]])
-    hints = middles(cells[part_source[kept]], incidence.boxes[parts[kept]])
-    lined = np.flatnonzero(answers.verdict[left] == Verdict.VISIBLE)
-    at = todo[left[lined]]
-    ends = segments(answers, left[lined], cells[part_source[at]], incidence.boxes[parts[at]])
-    hints[len(kept_own) + lined] = np.stack(ends, axis=1)
-    return potential, hints, parts[kept], pair_of[kept]
+    hints = middles(cells[source], part_boxes)
+    lined = np.flatnonzero(answers.verdict == Verdict.VISIBLE)
+    at = todo[lined]
+    hints[at] = np.stack(segments(answers, lined, cells[source[at]], part_boxes[at]), axis=1)
+    left = np.ones(len(parts), bool)
+    left[todo[answers.verdict == Verdict.HIDDEN]] = False
+    left = np.flatnonzero(left)
+    return left, hints[left]

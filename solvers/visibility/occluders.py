@@ -26,7 +26,7 @@ from ...kernels.blockers import BlockerTree, blocker_tree
 from ...kernels.shaft import ShaftAnswers, launch_shaft, patches_met
 from ...kernels.shields import Shields, device_shields
 from ...kernels.target import TargetAnswers, launch_target_search
-from .aim import AIM_ROUNDS, FIRST_TRIES, Sights, middles
+from .aim import AIM_ROUNDS, FIRST_TRIES, OPEN_ENOUGH, Sights, middles
 from .ledger import Ledger, apart, descend
 from .own_frames import FrameSearch
 from .search import segments
@@ -38,8 +38,6 @@ NODE_CAP, PIECE_CAP = 40, 2000
 # View cells and pieces are not halved below this, and a proof has at most so many subshafts.
 SMALLEST_M = (0.0625, 0.0625)
 SHAFT_CAP = 200
-# An object with so many pieces that could not be hidden is not looked at further: they are enough to aim at.
-OPEN_ENOUGH = 3
 # Sightlines shot near each line that a frame lets pass, round by round.
 FRAME_ROUNDS = AIM_ROUNDS[:2]
 
