@@ -4,6 +4,7 @@ Source: Funkhouser et al. 1996, section 3.1. Beyond the paper: the object's box 
 so that a slab or an L-shaped wall does not fill the empty corners of its bounding box.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,8 +34,33 @@ class Incidence:
     starts: np.ndarray
 
 
-def populate(scene: Scene, cells: np.ndarray) -> Incidence:
-    """Incidence of all objects, opaque or not, with the cells [grid steps], shape (n, 2, 3), int32."""
+def clip_rows(triangles: np.ndarray, ranges: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    """Bounds of what closed boxes hold of lists of triangles; as kernels/clip.py, whose reference it is."""
+    found = np.empty((len(boxes), 2, 3), np.int64)
+    found[:, 0], found[:, 1] = 2**30, -(2**30)
+    sizes = ranges[:, 1] - ranges[:, 0]
+    ends = np.cumsum(sizes)
+    begin = 0
+    while begin < len(boxes):
+        stop = max(begin + 1, int(np.searchsorted(ends, ends[begin] - sizes[begin] + CHUNK)))
+        part = sizes[begin:stop]
+        row = begin + np.repeat(np.arange(len(part)), part)
+        t = places_of(ranges[begin:stop, 0], part)
+        near = (triangles[t].min(axis=1) <= boxes[row, 1]).all(axis=1)
+        near &= (triangles[t].max(axis=1) >= boxes[row, 0]).all(axis=1)
+        row, t = row[near], t[near]
+        left, clipped = clip_bounds(triangles[t], boxes[row])
+        np.minimum.at(found[:, 0], row[left], clipped[left, 0])
+        np.maximum.at(found[:, 1], row[left], clipped[left, 1])
+        begin = stop
+    return found
+
+
+def populate(scene: Scene, cells: np.ndarray, clip: Callable[..., np.ndarray] = clip_rows) -> Incidence:
+    """Incidence of all objects, opaque or not, with the cells [grid steps], shape (n, 2, 3), int32.
+
+    `clip` gives bounds as `clip_rows` does; kernels/clip.py is faster.
+    """
     triangles, starts = scene.triangles()[0], scene.triangle_starts
     bounds = scene.object_bounds()
     cell, object_id, whole = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0, bool)]
@@ -47,7 +73,8 @@ def populate(scene: Scene, cells: np.ndarray) -> Incidence:
         whole.append(inside & (len(near) == 1))
     rows, objects, within = (np.concatenate(column) for column in (cell, object_id, whole))
     boxes = bounds[objects]
-    boxes[~within] = _clip_rows(triangles, starts, cells[rows[~within]], objects[~within])
+    own = objects[~within]
+    boxes[~within] = clip(triangles, np.column_stack([starts[own], starts[own + 1]]), cells[rows[~within]])
     kept = (boxes[:, 0] <= boxes[:, 1]).all(axis=1)
     # Contact along a line or in a point shows nothing to an open set of sightlines.
     kept &= (boxes[:, 1] > boxes[:, 0]).sum(axis=1) >= 2
@@ -61,28 +88,6 @@ def populate(scene: Scene, cells: np.ndarray) -> Incidence:
         within[order],
         np.searchsorted(rows, np.arange(len(cells) + 1)),
     )
-
-
-def _clip_rows(triangles: np.ndarray, starts: np.ndarray, cells: np.ndarray, objects: np.ndarray) -> np.ndarray:
-    """Bounds of each row's object inside the row's cell, shape (n, 2, 3), int64; low > high where nothing is there."""
-    found = np.empty((len(cells), 2, 3), np.int64)
-    found[:, 0], found[:, 1] = 2**30, -(2**30)
-    sizes = starts[objects + 1] - starts[objects]
-    ends = np.cumsum(sizes)
-    begin = 0
-    while begin < len(cells):
-        stop = max(begin + 1, int(np.searchsorted(ends, ends[begin] - sizes[begin] + CHUNK)))
-        part = sizes[begin:stop]
-        row = begin + np.repeat(np.arange(len(part)), part)
-        t = places_of(starts[objects[begin:stop]], part)
-        near = (triangles[t].min(axis=1) <= cells[row, 1]).all(axis=1)
-        near &= (triangles[t].max(axis=1) >= cells[row, 0]).all(axis=1)
-        row, t = row[near], t[near]
-        left, clipped = clip_bounds(triangles[t], cells[row])
-        np.minimum.at(found[:, 0], row[left], clipped[left, 0])
-        np.maximum.at(found[:, 1], row[left], clipped[left, 1])
-        begin = stop
-    return found
 
 
 def clip_bounds(triangles: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -19,8 +19,6 @@ from .first_hits import FirstHits
 # that is left, round by round.
 FIRST_TRIES = 12
 AIM_ROUNDS = (32, 128, 512)
-# An object with so many parts that could not be hidden is not looked at further: they are enough to aim at.
-OPEN_ENOUGH = 3
 
 
 @dataclass

@@ -13,9 +13,9 @@ from ...data.incidence import Incidence
 from ...data.ragged import places_of
 from ...data.rows import Rows
 from ...data.verdict import Verdict
-from .aim import AIM_ROUNDS, FIRST_TRIES, OPEN_ENOUGH, middles
+from .aim import AIM_ROUNDS, FIRST_TRIES, middles
 from .cells import CellModel
-from .search import search_rounds, segments
+from .search import open_pieces, search_rounds, segments
 
 
 def object_rows(
@@ -73,18 +73,12 @@ def _prove(
     order = np.argsort(pair_of, kind="stable")
     starts = np.searchsorted(pair_of[order], np.arange(len(rows) + 1))
     pairs = np.flatnonzero(~rows.seen)
-    first, last = starts[pairs], starts[pairs + 1]
-    open_parts, step = np.zeros(len(pairs), int), 1
-    found = [(np.zeros(0, int), np.zeros((0, 2, 3)))]
-    while len(active := np.flatnonzero((first < last) & (open_parts < OPEN_ENOUGH))):
-        sizes = np.minimum(step, last[active] - first[active])
-        at, place = np.repeat(active, sizes), order[places_of(first[active], sizes)]
-        left, hints = _prove_parts(model, incidence, parts[place], part_source[place])
-        found.append((place[left], hints))
-        np.add.at(open_parts, at[left], 1)
-        first[active] += sizes
-        step *= 2
-    place, hints = (np.concatenate(column) for column in zip(*found, strict=True))
+
+    def prove(_: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _prove_parts(model, incidence, parts[order[piece]], part_source[order[piece]])
+
+    _, piece, hints = open_pieces(starts[pairs], starts[pairs + 1], prove)
+    place = order[piece]
     potential = np.zeros(len(rows), bool)
     potential[pair_of[place]] = True
     return potential, hints, parts[place], pair_of[place]

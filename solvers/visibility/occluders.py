@@ -26,10 +26,10 @@ from ...kernels.blockers import BlockerTree, blocker_tree
 from ...kernels.shaft import ShaftAnswers, launch_shaft, patches_met
 from ...kernels.shields import Shields, device_shields
 from ...kernels.target import TargetAnswers, launch_target_search
-from .aim import AIM_ROUNDS, FIRST_TRIES, OPEN_ENOUGH, Sights, middles
+from .aim import AIM_ROUNDS, FIRST_TRIES, Sights, middles
 from .ledger import Ledger, apart, descend
 from .own_frames import FrameSearch
-from .search import segments
+from .search import OPEN_ENOUGH, open_pieces, segments
 
 # The root of the hierarchy is visible from everywhere: start where a level has some nodes.
 FIRST_LEVEL = 3
@@ -250,25 +250,18 @@ def _prove_pieces(model: OccluderModel, rows: Rows, ledger: Ledger | None) -> tu
     """
     starts = model.occludees.starts
     pairs = np.flatnonzero(~rows.seen)
-    first, last = starts[rows.target[pairs]], starts[rows.target[pairs] + 1]
-    left_of = np.zeros(len(pairs), int)
-    found = [(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2, 3)))]
-    step = 1
-    while len(active := np.flatnonzero((first < last) & (left_of < OPEN_ENOUGH))):
-        sizes = np.minimum(step, last[active] - first[active])
-        at, piece = np.repeat(active, sizes), places_of(first[active], sizes)
-        left, hints = _prove_pieces_of(model, rows.source[pairs[at]], piece, ledger, pairs[at])
-        found.append((pairs[at[left]], piece[left], hints[left]))
-        np.add.at(left_of, at[left], 1)
-        first[active] += sizes
-        step *= 2
-    return tuple(np.concatenate(column) for column in zip(*found, strict=True))
+
+    def prove(at: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _prove_pieces_of(model, rows.source[pairs[at]], piece, ledger, pairs[at])
+
+    at, piece, hints = open_pieces(starts[rows.target[pairs]], starts[rows.target[pairs] + 1], prove)
+    return pairs[at], piece, hints
 
 
 def _prove_pieces_of(
     model: OccluderModel, source: np.ndarray, piece: np.ndarray, ledger: Ledger | None, pair: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which pieces could not be hidden from the view cell of their row, bool, and a line to each, shape (n, 2, 3)."""
+    """Which rows' pieces could not be hidden from their view cell, and a line to each of them, shape (n, 2, 3)."""
     boxes = model.occludees.pieces[piece]
     hints = middles(model.cells[source], boxes)
     left = np.ones(len(source), bool)
@@ -290,4 +283,5 @@ def _prove_pieces_of(
     hidden = proofs.verdict == Verdict.HIDDEN
     left[at[hidden]] = False
     hints[at[~hidden]] = proofs.middle[~hidden]
-    return left, hints
+    left = np.flatnonzero(left)
+    return left, hints[left]

@@ -1,6 +1,6 @@
 """Visibility of a model from the cells of its cell-and-portal graph: of cells and of objects."""
 
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import warp as wp
@@ -15,6 +15,7 @@ from ...data.regions import Regions
 from ...data.rows import Rows
 from ...data.store.certificates import join_proofs
 from ...kernels import aim, line_tree, shaft, sightline, target, trace
+from ...kernels.clip import launch_clip
 from ...kernels.launch import CPU, Device
 from . import aim as aiming
 from . import cells as cell_search
@@ -60,7 +61,7 @@ class PortalEngine:
         self._objects = len(model.scene.objects)
         tiles = graph.tiles
         self._sights = Sights.of(model, graph.cells, seed, device, graph.plans)
-        self._incidence = populate(model.scene, tiles.cells)
+        self._incidence = populate(model.scene, tiles.cells, partial(launch_clip, device=device))
         blockers = model.walls if certify else model.blockers(tiles)
         self.model = CellModel(tiles, blockers, self._sights, seed, device)
 

@@ -1,8 +1,11 @@
 """Target searches in rounds, and the sightlines that they find."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...data.plans import NO_PLANS, Plans
+from ...data.ragged import places_of
 from ...data.verdict import Verdict
 from ...kernels.blockers import BlockerTree
 from ...kernels.launch import Device
@@ -10,6 +13,8 @@ from ...kernels.target import TargetAnswers, launch_target_search
 
 # Lines tried per pair, then again for what stayed undecided.
 CAPS = (200, 20_000)
+# An object with so many pieces that could not be hidden is not looked at further: they are enough to aim at.
+OPEN_ENOUGH = 3
 
 
 def search_rounds(tree: BlockerTree, boxes: np.ndarray, rows: np.ndarray, device: Device) -> TargetAnswers:
@@ -71,3 +76,30 @@ def segments(
         leave[own] = np.where(rate < 0, np.minimum(leave[own], met), leave[own])
     first, last = times(targets)
     return place(leave - 0.25 * (leave - enter)), place(first + 0.25 * (last - first))
+
+
+def open_pieces(
+    first: np.ndarray, last: np.ndarray, prove: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pieces of objects that cannot be hidden, looked at a few at a time until some of an object are known.
+
+    Args:
+        first: piece of each object to begin with, shape (n,), int.
+        last: past its last one.
+        prove: given objects and pieces, row by row, says which rows could not be hidden, and a line to each of those.
+
+    Returns:
+        Object and piece of each that could not be hidden, and the ends of a line to it, shape (m, 2, 3). An object
+        that is missing is hidden as a whole.
+    """
+    first, known, step = first.copy(), np.zeros(len(first), int), 1
+    found = [(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2, 3)))]
+    while len(active := np.flatnonzero((first < last) & (known < OPEN_ENOUGH))):
+        sizes = np.minimum(step, last[active] - first[active])
+        at, piece = np.repeat(active, sizes), places_of(first[active], sizes)
+        left, lines = prove(at, piece)
+        found.append((at[left], piece[left], lines))
+        np.add.at(known, at[left], 1)
+        first[active] += sizes
+        step *= 2
+    return tuple(np.concatenate(column) for column in zip(*found, strict=True))

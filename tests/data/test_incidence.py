@@ -1,42 +1,11 @@
 """Objects in cells: against clipping every triangle to every cell in rationals."""
 
-from fractions import Fraction
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from builders.random_buildings import box_triangles as box
 from builders.random_buildings import scene_of, tetrahedron
 from viewcell.data.incidence import clip_bounds, populate
-
-
-def clipped(triangle, low, high):
-    """Corners of the triangle clipped to the closed box, in rationals; a corner may be repeated."""
-    polygon = [tuple(Fraction(int(c)) for c in corner) for corner in triangle]
-    for axis in range(3):
-        for sign, k in ((1, int(low[axis])), (-1, int(high[axis]))):
-            edges = list(zip(polygon, polygon[1:] + polygon[:1], strict=True))
-            polygon = []
-            for p, q in edges:
-                s, t = sign * (p[axis] - k), sign * (q[axis] - k)
-                if s >= 0:
-                    polygon.append(p)
-                if s * t < 0:
-                    polygon.append(tuple(a + (b - a) * s / (s - t) for a, b in zip(p, q, strict=True)))
-    return polygon
-
-
-def bounds_of(points):
-    return [min(c) for c in zip(*points, strict=True)], [max(c) for c in zip(*points, strict=True)]
-
-
-def has_area(polygon):
-    """Whether a polygon is more than a segment."""
-    for p, q in pairwise(polygon[1:]):
-        u, v = ([b - a for a, b in zip(polygon[0], end, strict=True)] for end in (p, q))
-        if any(u[i] * v[i - 1] != u[i - 1] * v[i] for i in range(3)):
-            return True
-    return False
+from viewcell.verify.exact.clip import bounds_of, clipped, has_area
 
 
 def grid_cells():

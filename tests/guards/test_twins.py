@@ -14,6 +14,7 @@ TWINS = {
     "launch_line_trees": ("line_tree", "proofs.line_tree.hides", "verify/proofs/test_line_tree.py"),
     "launch_confirm": ("sightline", "exact.sightline.Sightlines", "kernels/test_sightline.py"),
     "launch_aim": ("aim", "exact.sightline.Sightlines", "kernels/test_aim.py"),
+    "launch_clip": ("clip", "exact.clip.clipped", "kernels/test_clip.py"),
     "launch_trace": ("trace", "exact.trace.portal_path", "kernels/test_trace.py"),
     "launch_shaft": ("shaft", "exact.umbra.hides", "kernels/test_shaft.py"),
     "launch_coverage": ("coverage", "exact.coverage.cover_polygon", "kernels/test_coverage.py"),

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 from builders import random_buildings, small_house
+from viewcell.data.blockers import find_blockers
 from viewcell.data.prepared import PreparedModel
 from viewcell.data.scene import OPAQUE
 from viewcell.data.verdict import Verdict
 from viewcell.kernels.launch import CPU
+from viewcell.solvers.visibility import cells as cell_search
 from viewcell.solvers.visibility.aim import Sights
 from viewcell.solvers.visibility.cells import (
     CellModel,
@@ -14,6 +16,8 @@ from viewcell.solvers.visibility.cells import (
     cell_rows,
     certified_pairs,
     join_cell_rows,
+    search_outwards,
+    search_pairs,
     strictly_inside,
 )
 from viewcell.solvers.visibility.graph_engine import GraphEngine
@@ -48,6 +52,37 @@ def test_reached_cells_are_those_of_the_exact_search(house, truth):
     assert rows.seen.all() and (clear == Sight.CLEAR).all()
     assert strictly_inside(rows.origin, model.graph.cells[rows.source]).all()
     assert strictly_inside(rows.end, model.graph.cells[rows.target]).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_outwards_leaves_out_is_hidden(seed):
+    """In any order of the sources; what is asked about gets the same answers as alone."""
+    graph, _ = random_buildings.random_graph(seed, walls=6)
+    model = CellModel(graph, find_blockers(graph))
+    sources = np.arange(graph.cell_count)[::-3]
+    pairs, answers = search_outwards(model, sources)
+    every = np.array([(s, t) for s in sources for t in range(graph.cell_count) if s != t])
+    whole = search_pairs(model, every, None)
+    place = {pair: n for n, pair in enumerate(map(tuple, pairs.tolist()))}
+    at = np.array([place.get(pair, -1) for pair in map(tuple, every.tolist())])
+    assert at[at >= 0].tolist() == list(range(len(pairs))), "ordered as the sources are, each pair once"
+    assert (whole.verdict[at < 0] == Verdict.HIDDEN).all() and (at < 0).mean() > 0.05
+    for name in ("verdict", "octant", "line", "offset"):
+        np.testing.assert_array_equal(getattr(whole, name)[at >= 0], getattr(answers, name))
+
+
+def test_outwards_asks_beside_what_is_not_hidden(house, monkeypatch):
+    """What is not decided leads on: every cell of the house is joined to every other one."""
+    model, _ = house
+
+    def undecided(model, pairs, ledger):
+        answers = search_pairs(model, pairs, ledger)
+        answers.verdict[:] = Verdict.UNKNOWN
+        return answers
+
+    monkeypatch.setattr(cell_search, "search_pairs", undecided)
+    pairs, _ = search_outwards(model, np.arange(2))
+    assert len(pairs) == 2 * (model.graph.cell_count - 1)
 
 
 def test_without_aim_the_same_is_hidden(house):
