@@ -58,6 +58,15 @@ class Rows:
         self.verdict[chosen] = Verdict.VISIBLE
         self.origin[chosen], self.end[chosen] = origin, end
 
+    def adopt(self, others: "Rows") -> None:
+        """Show rows without a witness by those that others, ordered and all seen, have of the same pair, in place."""
+        if len(others):
+            span = 1 + max(int(self.target.max(initial=0)), int(others.target.max()))
+            key, known = (rows.source * span + rows.target for rows in (self, others))
+            at = np.searchsorted(known, key).clip(max=len(known) - 1)
+            rows = np.flatnonzero(~self.seen & (known[at] == key))
+            self.show(rows, others.origin[at[rows]], others.end[at[rows]])
+
     def take(self, chosen: np.ndarray) -> "Rows":
         """Some rows (indices or bool), with their portals."""
         columns = (self.source, self.target, self.verdict, self.origin, self.end)
@@ -70,6 +79,12 @@ class Rows:
     def order(self) -> "Rows":
         """Ordered by source, then target."""
         return self.take(np.lexsort((self.target, self.source)))
+
+    def once(self) -> "Rows":
+        """Ordered rows without those whose pair the row before has."""
+        first = np.ones(len(self), bool)
+        first[1:] = (np.diff(self.source) != 0) | (np.diff(self.target) != 0)
+        return self.take(first)
 
     def with_portals(self, counts: np.ndarray, portals: np.ndarray) -> "Rows":
         """The same rows, each with so many of the portals."""

@@ -34,7 +34,7 @@ class Sights:
         plans: of view cells that stand at an angle: eyes are inside them.
         seed: of the random sightlines.
         device: that holds the triangles.
-        finder: of sightlines that may be clear; a GPU confirms all as fast.
+        finder: of sightlines that may be clear, on the CPU.
     """
 
     model: PreparedModel
@@ -45,7 +45,7 @@ class Sights:
     plans: Plans
     seed: int
     device: Device
-    finder: Finder | None
+    finder: Finder
 
     @classmethod
     def of(
@@ -58,7 +58,7 @@ class Sights:
         triangles = device_triangles(everything, owners, device, opaque=opaque)
         starts = np.searchsorted(owners, np.arange(len(scene.objects) + 1))
         ranges, solids = np.column_stack([starts[:-1], starts[1:]]), SolidIndex(cells, model.closed)
-        finder = Finder(everything, owners, opaque, device.threads) if device.is_cpu else None
+        finder = Finder(everything, owners, opaque, device.threads)
         return cls(model, cells, triangles, ranges, solids, plans, seed, device, finder)
 
     def from_cells(self, cells: np.ndarray) -> "Sights":
@@ -106,7 +106,8 @@ class Sights:
         if not len(pairs):
             return
         source, target = rows.source[pairs], rows.target[pairs]
-        guide = None if self.finder is None else FirstHits(self.finder, rows, pairs, self._serve)
+        # A GPU confirms all as fast as they are found.
+        guide = FirstHits(self.finder, rows, pairs, self._serve) if self.device.is_cpu else None
         found, origin, end = launch_aim(
             self.triangles,
             self.cells[source],

@@ -84,7 +84,7 @@ def search_outwards(model: CellModel, sources: np.ndarray) -> tuple[np.ndarray, 
     asked[own, sources] = True
     row, cell = own, np.asarray(sources)
     found = []
-    while len(row):
+    while len(row) or not found:
         sizes = (starts[1:] - starts[:-1])[cell]
         beside = entries[places_of(starts[cell], sizes), 1]
         row, cell = np.divmod(np.unique(np.repeat(row, sizes) * count + beside), count)
@@ -247,7 +247,7 @@ def _aim(model: CellModel, rows: Rows, aim_rounds: tuple[int, ...]) -> None:
             seeds(model.seed + number + 1000 * copy, source, target),
             ~refused[todo],
             tries=tries,
-            guide=sights.finder,
+            guide=sights.finder if model.device.is_cpu else None,
             device=model.device,
         )
         hit = np.flatnonzero(found)

@@ -73,11 +73,19 @@ class Engine(Protocol):
                 pairs are hidden, in a fraction of the time, and more of the others stay unknown.
         """
 
+    def glance(self, block: np.ndarray, number: int) -> Rows:
+        """Objects that some sources see at a glance, seen pairs only, ordered; others with each number."""
+
     def unknown(self, block: np.ndarray) -> Part:
         """Rows that claim nothing: everything stays potential."""
 
-    def join(self, parts: list[Part]) -> tuple[Rows | None, Rows]:
-        """Tables of all blocks: cells, if anything is claimed of them, and objects; ordered."""
+    def join(self, parts: list[Part], *, share: bool = True) -> tuple[Rows | None, Rows]:
+        """Tables of all blocks: cells, if anything is claimed of them, and objects; ordered.
+
+        Args:
+            parts: of all blocks.
+            share: let sightlines serve other sources than those that they were found from.
+        """
 
 
 def unknown_rows(block: np.ndarray, count: int) -> Rows:

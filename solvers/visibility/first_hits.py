@@ -45,29 +45,35 @@ class FirstHits:
         key = source[hit] * self._count + owner[hit]
         at = np.searchsorted(self._key[:-1], key)
         known = self._key[at] == key
-        self._taken.append(_first_of_each(self._row[at[known]], triangle, origins, ends, hit[known]))
+        self._taken.append(first_of_each(self._row[at[known]], triangle, origins, ends, hit[known]))
         return triangle < 0
 
     def wanted(self, rows: np.ndarray, found: np.ndarray) -> np.ndarray:
         """As of `Guide`: those of pairs that no attempt has seen by now."""
         row, *columns = (np.concatenate(column) for column in zip(*self._taken, strict=True))
         self._taken = []
-        row, triangle, origin, end = _first_of_each(row, *columns, np.arange(len(row)))
-        a, b, c = self._finder.triangles[triangle].astype(float).transpose(1, 0, 2)
-        normal, way = np.cross(b - a, c - a), end - origin
-        with np.errstate(divide="ignore", invalid="ignore"):
-            reach = ((a - origin) * normal).sum(axis=1) / (way * normal).sum(axis=1)
-        met = np.flatnonzero((reach > 0) & (reach <= 1) & ~self._rows.seen[row])
-        end = on_witness_grid(origin[met] + reach[met, None] * way[met])
-        self._serve(self._rows, row[met], triangle[met], origin[met], end)
+        row, triangle, origin, end = first_of_each(row, *columns, np.arange(len(row)))
+        met, end = cut_short(self._finder.triangles[triangle], origin, end)
+        met &= ~self._rows.seen[row]
+        self._serve(self._rows, row[met], triangle[met], origin[met], end[met])
         pairs = self._pairs[rows]
         return ~self._rows.seen[pairs] & ~np.isin(pairs, self._pairs[found])
 
 
-def _first_of_each(row: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
+def first_of_each(row: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
     """First few of each row: the row, and what the columns but the last hold at the places that the last names."""
     *columns, place = columns
     order = np.argsort(row, kind="stable")
     row = row[order]
     kept = np.flatnonzero(np.arange(len(row)) - np.searchsorted(row, row) < KEPT)
     return row[kept], *(column[place[order[kept]]] for column in columns)
+
+
+def cut_short(triangles: np.ndarray, origin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whether each line meets its triangle's plane, bool, and where, on the witness grid, shape (n, 3)."""
+    a, b, c = triangles.astype(float).transpose(1, 0, 2)
+    normal, way = np.cross(b - a, c - a), end - origin
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = ((a - origin) * normal).sum(axis=1) / (way * normal).sum(axis=1)
+    met = (reach > 0) & (reach <= 1)
+    return met, on_witness_grid(origin + np.where(met, reach, 0.0)[:, None] * way)

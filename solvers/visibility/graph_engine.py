@@ -58,11 +58,15 @@ class GraphEngine:
         cells = self._search(block, np.argwhere(left), [], ledger)
         return Part(cells, NO_OBJECTS, ledger.close(np.zeros(0, bool)))
 
+    def glance(self, block: np.ndarray, number: int) -> Rows:
+        """As of `Engine`: there are no objects."""
+        return NO_OBJECTS
+
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""
         return Part(unknown_rows(block, self.model.graph.cell_count), NO_OBJECTS)
 
-    def join(self, parts: list[Part]) -> tuple[Rows, Rows]:
+    def join(self, parts: list[Part], *, share: bool = True) -> tuple[Rows, Rows]:
         """As of `Engine`; cells are made symmetric: A sees B exactly when B sees A."""
         return join_cell_rows(self.model, [part.cells for part in parts]), join_objects(parts)
 

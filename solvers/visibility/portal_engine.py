@@ -22,6 +22,7 @@ from . import cells as cell_search
 from .aim import Sights
 from .cells import CellModel, cell_rows, join_cell_rows
 from .engine import Part, join_objects, unknown_rows
+from .glance import look_around
 from .ledger import Ledger
 from .objects import object_rows
 from .occluders import OccluderModel, hidden_boxes, refine_objects, seen_objects
@@ -130,13 +131,18 @@ class PortalEngine:
         kept[todo] = ~hidden_boxes(self.occluders, rows.source[todo], boxes, ledger)
         return rows.take(kept)
 
+    def glance(self, block: np.ndarray, number: int) -> Rows:
+        """As of `Engine`."""
+        return look_around(self._sights, block, number)
+
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""
         count = self.model.graph.cell_count
         return Part(unknown_rows(block[block < count], count), unknown_rows(block, self._objects))
 
-    def join(self, parts: list[Part]) -> tuple[Rows, Rows]:
+    def join(self, parts: list[Part], *, share: bool = True) -> tuple[Rows, Rows]:
         """As of `Engine`; cells are made symmetric: A sees B exactly when B sees A."""
         objects = join_objects(parts)
-        share_sightlines(self._sights, objects)
+        if share:
+            share_sightlines(self._sights, objects)
         return join_cell_rows(self.model, [part.cells for part in parts]), objects

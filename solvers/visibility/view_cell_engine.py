@@ -16,6 +16,7 @@ from ...kernels import aim, line_tree, shaft, sightline, target
 from ...kernels.launch import CPU, Device
 from .aim import AIM_ROUNDS, Sights
 from .engine import Part, join_objects, unknown_rows
+from .glance import look_around
 from .ledger import Ledger
 from .occluders import OccluderModel, look_at_objects, seen_objects
 from .projection import VlodSettings, vlod_hidden
@@ -93,12 +94,17 @@ class ViewCellEngine:
         look_at_objects(model, rows, aim_rounds)
         return rows
 
+    def glance(self, block: np.ndarray, number: int) -> Rows:
+        """As of `Engine`."""
+        return look_around(self.model.sights, block, number)
+
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""
         return Part(None, unknown_rows(block, self._objects))
 
-    def join(self, parts: list[Part]) -> tuple[None, Rows]:
+    def join(self, parts: list[Part], *, share: bool = True) -> tuple[None, Rows]:
         """As of `Engine`; nothing is claimed of cells."""
         objects = join_objects(parts)
-        share_sightlines(self.model.sights, objects)
+        if share:
+            share_sightlines(self.model.sights, objects)
         return None, objects

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...data.errors import InputError
 from ...data.progress import Phase
+from ...data.rows import Rows
 from ...data.store.blocks import read_block, write_block
 from ...data.view_cells import as_graph, octants, walkable
 from .cells import Sources
@@ -19,6 +20,9 @@ from .settings import CellSettings
 if TYPE_CHECKING:
     from ...solvers.visibility.engine import Engine, Part
 
+# Looks around from every view cell before anything else under a budget: share of the time at most, number at most, and
+# the share by which a look has to add to what is seen for there to be another.
+GLANCE, GLANCES, GLANCE_LEAST = 0.05, 16, 0.02
 # How the name of a folder of unfinished work ends.
 PARTIAL = ".partial"
 # Sources per block, which an interrupted bake resumes from.
@@ -116,19 +120,24 @@ class Work:
         """All blocks, and what the deadline left of them, if it ended them early: that is unknown, never hidden."""
         if np.isinf(self.deadline):
             return [self.finish(number, block) for number, block in enumerate(blocks)], None
-        # First what is hidden from each, then witnesses where most is unknown.
-        parts, rough, raw = [], [], []
+        # First what is seen at a glance, then what is hidden from each, then witnesses where most is unknown.
+        glances = self._glance(blocks)
+        parts, rough, raw, rest = [], [], [], []
         first = _Rate()
         for number, block in enumerate(blocks):
             part = self.store.load(number)
             if part is not None:
                 self.bar.update(len(block))
-            elif not first.fits(len(block), self.deadline):
-                raw.append(number)
-                part = self.engine.unknown(block)
-            else:
+            elif first.fits(len(block), self.deadline):
                 rough.append(number)
                 part = first.take(len(block), lambda block=block: self.engine.visible(block, aim=False))
+            else:
+                raw.append(number)
+                # As much of it as there is time for.
+                some = block[: first.room(self.deadline)]
+                if len(some):
+                    rest.append(first.take(len(some), lambda some=some: self.engine.visible(some, aim=False)))
+                part = self.engine.unknown(block[len(some) :])
             parts.append(part)
         rough.sort(key=lambda number: -parts[number].unknown_count)
         # Witnesses take as long again where none were looked for yet, or several times so.
@@ -137,6 +146,8 @@ class Work:
             number = rough.pop(0)
             block = blocks[number]
             parts[number] = full.take(len(block), lambda number=number, block=block: self.finish(number, block))
+        for part in parts:
+            part.objects.adopt(glances)
         left = raw + rough
         if not left:
             return parts, None
@@ -144,8 +155,22 @@ class Work:
         needed = None
         if first.cells:
             needed = time.perf_counter() - self.started + counts[0] * first.each + counts[1] * full.each
-        pairs = sum(parts[number].unknown_count for number in left)
+        parts += rest
+        pairs = sum(part.unknown_count for part in [*(parts[number] for number in left), *rest])
         return parts, Shortfall("hiding" if raw else "witnesses", counts[1], pairs, needed)
+
+    def _glance(self, blocks: list[np.ndarray]) -> Rows:
+        """Objects seen from the cells of all blocks in a few looks around, while a look shows enough more; ordered."""
+        found, until = [], time.perf_counter() + GLANCE * (self.deadline - time.perf_counter())
+        for number in range(GLANCES):
+            before, fresh = sum(map(len, found)), []
+            for block in blocks:
+                if time.perf_counter() <= until:
+                    fresh.append(self.engine.glance(block, number))
+            found = [Rows.join([*found, *fresh]).order().once()]
+            if len(found[0]) - before <= GLANCE_LEAST * before:
+                break
+        return found[0]
 
 
 @dataclass
@@ -164,6 +189,10 @@ class _Rate:
     def fits(self, cells: int, deadline: float) -> bool:
         """Whether so many more are done by a deadline, as far as is known."""
         return time.perf_counter() + cells * self.each <= deadline
+
+    def room(self, deadline: float) -> int:
+        """View cells that are done by a deadline; none where nothing is known."""
+        return max(0, int((deadline - time.perf_counter()) / self.each)) if self.each else 0
 
     def take(self, cells: int, do: "Callable[[], Part]") -> "Part":
         """What `do` returns, timed."""

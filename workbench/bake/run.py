@@ -237,7 +237,9 @@ def _leaks(sources: Sources, rows: tuple[Rows, Rows], settings: Settings, run: _
     engine = engine_of(replace(sources, graph=whole), settings, run.device)
     parts = [engine.visible(block, aim=False) for block in in_blocks(sources)]
     pairs = []
-    for open_rows, kept, targets in zip(engine.join(parts), rows, (graph.cell_count, len(scene.objects)), strict=True):
+    for open_rows, kept, targets in zip(
+        engine.join(parts, share=False), rows, (graph.cell_count, len(scene.objects)), strict=True
+    ):
         keys = [part.source.astype(np.int64) * targets + part.target for part in (open_rows, kept)]
         pairs.append(np.column_stack(np.divmod(np.setdiff1d(*keys), targets)))
     counts = {
@@ -300,7 +302,8 @@ def _visibility(
         sources.facts["counts"] = sources.facts["counts"] | {"proofs": len(proofs.cell)}
         sources.facts["certificate_s"] = round(proofs.seconds, 3)
         clock.lap("certificates")
-    return *work.engine.join(parts), tables, short
+    # Where time ran out, most is unknown, and sharing would take as long again.
+    return *work.engine.join(parts, share=short is None), tables, short
 
 
 def _triangle_counts(model: PreparedModel, graph: CellGraph, rows: Rows, device: "Device") -> dict[str, int]:

@@ -85,6 +85,11 @@ def test_outwards_asks_beside_what_is_not_hidden(house, monkeypatch):
     assert len(pairs) == 2 * (model.graph.cell_count - 1)
 
 
+def test_nobody_reaches_nothing(house):
+    """A block may hold only view cells that stand at an angle, which others look from."""
+    assert len(cell_rows(house[0], np.zeros(0, int))) == 0
+
+
 def test_without_aim_the_same_is_hidden(house):
     model, _ = house
     sources = np.flatnonzero(model.graph.inhabitable)

@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 import viewcell
@@ -18,6 +19,7 @@ from builders.room_sets import assert_room_sets
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.scene import Role
+from viewcell.solvers.visibility.portal_engine import PortalEngine
 from viewcell.verify.exact.sightline import Sight, Sightlines
 from viewcell.verify.rays.witness import visible_rows
 from viewcell.workbench.bake import blocks, manifest, place
@@ -193,6 +195,17 @@ def test_no_budget_leaves_everything_unknown(office, tmp_path):
     assert bake.cell_to_cell.num_rows == sources * cells and bake.cell_to_object.num_rows == sources * objects
     for name in TABLES:
         assert set(getattr(bake, name)["verdict"].to_pylist()) == {"unknown"}
+    assert check_two_sided(bake, rays=20_000).ok
+
+
+def test_what_is_seen_at_a_glance_is_kept_when_the_budget_ends(office, office_bake, tmp_path, monkeypatch):
+    """Nothing else is done: all is kept, and much of it is known to be seen."""
+    monkeypatch.setattr(PortalEngine, "visible", lambda engine, block, aim=True: engine.unknown(block))
+    bake = viewcell.bake(office, tmp_path / "office", budget_s=60.0)
+    seen = pc.sum(pc.equal(bake.cell_to_object["verdict"], "visible")).as_py()
+    whole = office_bake.manifest["counts"]["object_pairs_seen"]
+    assert bake.potential_objects.sum() == bake.potential_objects[bake.graph.inhabitable].size
+    assert 0.25 * whole < seen <= bake.manifest["counts"]["object_pairs_seen"] <= 1.01 * whole
     assert check_two_sided(bake, rays=20_000).ok
 
 
