@@ -21,6 +21,7 @@ KERNELS: dict[str, Callable[[HardCases, Device], Outcomes]] = {
     "launch_coverage": shadows.coverage,
     "launch_occludees": shadows.occludees,
     "launch_backface": meshes.backface,
+    "launch_clip": meshes.clip,
     "launch_select": meshes.select,
     "launch_deviation": meshes.deviation,
     "launch_raster": meshes.raster,

@@ -1,4 +1,4 @@
-"""Hard cases of meshes and levels: back faces, deviation, pictures, and the choice of levels."""
+"""Hard cases of meshes and levels: back faces, clipping, deviation, pictures, and the choice of levels."""
 
 from fractions import Fraction
 
@@ -8,12 +8,14 @@ from ...data.camera import CameraPath, Screen
 from ...data.scene import Definition, Instance, Mesh, Role, Scene
 from ...data.solids import closed_elements
 from ...kernels.backface import build_cones, launch_backface
+from ...kernels.clip import launch_clip
 from ...kernels.deviation import launch_deviation
 from ...kernels.launch import Device
 from ...kernels.raster import device_triangles as raster_triangles
 from ...kernels.raster import launch_raster
 from ...kernels.select import launch_select
 from ...verify.cases.hard_cases import HardCases, Shape, faces, fan
+from ...verify.exact.clip import bounds_of, clipped
 from ...verify.exact.deviation import deviation_squared
 from ...verify.exact.raster import first_hit
 from .outcomes import Outcome, Outcomes, worst
@@ -64,6 +66,23 @@ def select(cases: HardCases, device: Device) -> Outcomes:
             yield case.name, Outcome.RIGHT if value == case.expected else Outcome.WITHHELD
         else:
             yield case.name, Outcome.WRONG
+
+
+def clip(cases: HardCases, device: Device) -> Outcomes:
+    """What is left of all shapes in the box from the cell's middle to the target's: no less than in rationals."""
+    for case in cases.region:
+        triangles = triangles_of([*case.occluders, case.target]).astype(np.int32)
+        middles = [np.array(box, np.int64).sum(axis=0) // 2 for box in (case.cell, case.target)]
+        box = np.array([np.min(middles, axis=0), np.max(middles, axis=0)], np.int32)
+        found = launch_clip(triangles, np.array([[0, len(triangles)]]), box[None], device=device)[0].tolist()
+        left = [polygon for polygon in (clipped(t, *box) for t in triangles) if len(polygon) > 2]
+        if not left:
+            yield case.name, Outcome.RIGHT if any(a > b for a, b in zip(*found, strict=True)) else Outcome.WITHHELD
+            continue
+        least, most = bounds_of([point for polygon in left for point in polygon])
+        held = all(a <= b for a, b in [*zip(found[0], least, strict=True), *zip(most, found[1], strict=True)])
+        tight = all(b - a < 2 for a, b in [*zip(found[0], least, strict=True), *zip(most, found[1], strict=True)])
+        yield case.name, (Outcome.RIGHT if tight else Outcome.WITHHELD) if held else Outcome.WRONG
 
 
 def deviation(cases: HardCases, device: Device) -> Outcomes:

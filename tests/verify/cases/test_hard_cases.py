@@ -272,6 +272,7 @@ BROKEN = {
     "launch_coverage": ("launch_coverage", FullMaps),
     "launch_occludees": ("launch_occludees", np.zeros_like),
     "launch_backface": ("launch_backface", lambda found: (found[0] + 1, found[1])),
+    "launch_clip": ("launch_clip", lambda found: found // 2),
     "launch_deviation": ("launch_deviation", lambda found: replace(found, upper=found.upper / 2)),
     "launch_raster": ("launch_raster", lambda images: replace(images, ids=images.ids + 1)),
     "launch_select": ("launch_select", lambda found: replace(found, bound=found.bound / 2)),
