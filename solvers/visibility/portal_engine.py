@@ -22,7 +22,7 @@ from . import cells as cell_search
 from .aim import Sights
 from .cells import CellModel, cell_rows, join_cell_rows
 from .engine import Part, join_objects, unknown_rows
-from .glance import look_around
+from .glance import glance
 from .ledger import Ledger
 from .objects import object_rows
 from .occluders import OccluderModel, hidden_boxes, refine_objects, seen_objects
@@ -133,7 +133,7 @@ class PortalEngine:
 
     def glance(self, block: np.ndarray, number: int) -> Rows:
         """As of `Engine`."""
-        return look_around(self._sights, block, number)
+        return glance(self._sights, block, number)
 
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""

@@ -16,7 +16,7 @@ from ...kernels import aim, line_tree, shaft, sightline, target
 from ...kernels.launch import CPU, Device
 from .aim import AIM_ROUNDS, Sights
 from .engine import Part, join_objects, unknown_rows
-from .glance import look_around
+from .glance import glance
 from .ledger import Ledger
 from .occluders import OccluderModel, look_at_objects, seen_objects
 from .projection import VlodSettings, vlod_hidden
@@ -96,7 +96,7 @@ class ViewCellEngine:
 
     def glance(self, block: np.ndarray, number: int) -> Rows:
         """As of `Engine`."""
-        return look_around(self.model.sights, block, number)
+        return glance(self.model.sights, block, number)
 
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""

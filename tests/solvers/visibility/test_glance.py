@@ -9,7 +9,7 @@ from viewcell.data.rows import Rows
 from viewcell.data.scene import Role
 from viewcell.kernels.launch import CPU, Device
 from viewcell.solvers.visibility.aim import Sights
-from viewcell.solvers.visibility.glance import look_around
+from viewcell.solvers.visibility.glance import SECOND, glance, look_around
 from viewcell.verify.exact.sightline import Sight, Sightlines
 
 
@@ -35,9 +35,23 @@ def sights(model, device=CPU, plans=None):
 def test_what_is_met_is_seen(model):
     view = sights(model)
     rows = Rows.join([look_around(view, np.arange(3), number) for number in range(8)]).order().once()
-    pairs = list(zip(rows.source.tolist(), rows.target.tolist(), strict=True))
     # All of the room but the pane, which no ray meets; nothing from inside the tower.
-    assert pairs == [(cell, thing) for cell in (0, 1) for thing in (0, 1, 2, 3, 4, 5, 6, 8)] and rows.seen.all()
+    check(view, rows, [(cell, thing) for cell in (0, 1) for thing in (0, 1, 2, 3, 4, 5, 6, 8)])
+
+
+def test_what_is_aimed_at_is_seen_if_nothing_is_before_it(model):
+    """The pane as well; and the same whichever view cells are asked about together, in any order."""
+    view = sights(model)
+    rows = glance(view, np.array([2, 0, 1]), SECOND)
+    check(view, rows, [(cell, thing) for cell in (0, 1) for thing in range(9)])
+    alone = glance(view, np.array([1]), SECOND)
+    assert (rows.origin[9:] == alone.origin).all() and (rows.end[9:] == alone.end).all()
+
+
+def check(view, rows, expected):
+    """The pairs, ordered, each with a witness that the exact test allows."""
+    assert list(zip(rows.source.tolist(), rows.target.tolist(), strict=True)) == expected and rows.seen.all()
+    model = view.model
     triangles, owners = model.scene.triangles()
     for row in range(len(rows)):
         box, own = view.cells[rows.source[row]], owners == rows.target[row]
