@@ -25,7 +25,7 @@ NEAR_PICKS = wp.constant(6)
 # Sightlines near a hint move by a share of the box down to two to this power, evenly in the exponent.
 NEAREST = wp.constant(wp.float64(-6.0))
 # Sightlines drawn for a row at first; then twice as many each time, for rows that lack one. And drawn together.
-FIRST_DRAWN, TOGETHER = 4, 1 << 18
+FIRST_DRAWN, TOGETHER = 4, 1 << 20
 
 
 class Guide(Protocol):
