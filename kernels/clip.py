@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 
 from .launch import CPU, Device, launch_rows
+from .sightline import real
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -28,12 +29,6 @@ class Polygon:
 
     corners: mat93d
     count: int
-
-
-@wp.func
-def real(v: wp.vec3i) -> wp.vec3d:
-    """Integer vector as float64."""
-    return wp.vec3d(f64(v[0]), f64(v[1]), f64(v[2]))
 
 
 @wp.func

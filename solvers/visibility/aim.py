@@ -107,7 +107,7 @@ class Sights:
             return
         source, target = rows.source[pairs], rows.target[pairs]
         # A GPU confirms all as fast as they are found.
-        guide = FirstHits(self.finder, rows, pairs, self._serve) if self.device.is_cpu else None
+        guide = FirstHits(self.finder, rows, pairs, self.serve) if self.device.is_cpu else None
         found, origin, end = launch_aim(
             self.triangles,
             self.cells[source],
@@ -129,7 +129,7 @@ class Sights:
         good = np.flatnonzero(self.outside(rows.source[pairs], origin))
         rows.show(pairs[good], origin[good], end[good])
 
-    def _serve(self, rows: Rows, pairs: np.ndarray, triangle: np.ndarray, origin: np.ndarray, end: np.ndarray) -> None:
+    def serve(self, rows: Rows, pairs: np.ndarray, triangle: np.ndarray, origin: np.ndarray, end: np.ndarray) -> None:
         """Show pairs by sightlines to triangles of their objects, where those are clear, in place."""
         options = {"ranges": triangle[:, None] + [0, 1], "device": self.device}
         good = launch_confirm(self.triangles, origin, end, rows.target[pairs], **options)

@@ -8,7 +8,6 @@ Roberts 2018, "The unreasonable effectiveness of quasirandom sequences".
 import numpy as np
 
 from ...data.rows import Rows
-from ...kernels.sightline import launch_confirm
 from .aim import Sights, middles, seeds
 from .engine import unknown_rows
 from .first_hits import cut_short, first_of_each
@@ -60,12 +59,6 @@ def look_around(sights: Sights, cells: np.ndarray, number: int) -> Rows:
     key = cell[hit] * count + sights.finder.owners[triangle[hit]]
     key, triangle, origin, end = first_of_each(key, triangle, origin, origin + way, hit)
     met, end = cut_short(sights.finder.triangles[triangle], origin, end)
-    key, triangle, origin, end = key[met], triangle[met], origin[met], end[met]
-    source, target = np.divmod(key, count)
-    options = {"ranges": triangle[:, None] + [0, 1], "device": sights.device}
-    good = np.flatnonzero(launch_confirm(sights.triangles, origin, end, target, **options))
-    good = good[sights.outside(source[good], origin[good])]
-    good = good[np.unique(key[good], return_index=True)[1]]
-    rows = Rows.unseen(source[good], target[good])
-    rows.show(np.arange(len(good)), origin[good], end[good])
-    return rows
+    rows = Rows.unseen(*np.divmod(key[met], count))
+    sights.serve(rows, np.arange(len(rows)), triangle[met], origin[met], end[met])
+    return rows.take(rows.seen).once()
