@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from .graph import OTHER_AXES, CellGraph
-from .hierarchy import Hierarchy, build_hierarchy
 from .opaque import NO_PLANES, OpaquePlanes
 
 
@@ -22,18 +21,16 @@ class Blockers:
     Attributes:
         boxes: flat boxes, or boxes of curtains [grid steps], shape (blockers, 2, 3), int32.
         axis: the axis each is perpendicular to, or the kind of curtain (data/curtains.py), shape (blockers,), int32.
-        hierarchy: over the boxes.
     """
 
     boxes: np.ndarray
     axis: np.ndarray
-    hierarchy: Hierarchy
 
 
 def join_blockers(parts: list[Blockers]) -> Blockers:
     """All of some blockers, in order."""
     boxes = np.concatenate([part.boxes for part in parts])
-    return Blockers(boxes, np.concatenate([part.axis for part in parts]), build_hierarchy(boxes))
+    return Blockers(boxes, np.concatenate([part.axis for part in parts]))
 
 
 def find_blockers(graph: CellGraph, opaque: OpaquePlanes | None = None) -> Blockers:
@@ -63,7 +60,7 @@ def find_blockers(graph: CellGraph, opaque: OpaquePlanes | None = None) -> Block
                 axes.append(np.full(len(boxes), axis, np.int32))
     boxes = np.concatenate(pieces) if pieces else np.zeros((0, 2, 3), np.int32)
     axis_of = np.concatenate(axes) if axes else np.zeros(0, np.int32)
-    return Blockers(boxes, axis_of, build_hierarchy(boxes))
+    return Blockers(boxes, axis_of)
 
 
 def _plane_blockers(graph: CellGraph, axis: int, k: int, near: np.ndarray, opaque: np.ndarray) -> np.ndarray:

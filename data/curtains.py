@@ -16,7 +16,6 @@ from itertools import combinations
 import numpy as np
 
 from .blockers import Blockers, maximal_rectangles, paint
-from .hierarchy import build_hierarchy
 from .opaque import plane_rectangles
 from .progress import track
 from .regions import section_rectangles
@@ -65,7 +64,7 @@ def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float) 
             _add(boxes, kinds, part)
     _add(boxes, kinds, _upright_faces(faces, least))
     joined = np.concatenate(boxes).astype(np.int32)
-    return Blockers(joined, np.concatenate(kinds).astype(np.int32), build_hierarchy(joined))
+    return Blockers(joined, np.concatenate(kinds).astype(np.int32))
 
 
 def _add(boxes: list[np.ndarray], kinds: list[np.ndarray], quads: np.ndarray) -> None:

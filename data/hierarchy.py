@@ -1,62 +1,16 @@
-"""A bounding volume hierarchy that kernels traverse without a stack.
+"""A hierarchy of boxes, level by level, for searches that take a whole level at once.
 
-Boxes are halved at the median of their widest axis, level by level, into a perfect binary tree stored in depth-first
-order: a node's first child is the next node, and `skip` is where to go when the node is missed or done.
+Boxes are halved at the median of their widest axis into a perfect binary tree. Lines go through trees of
+kernels/hierarchy.py, which are better for them.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 
 EMPTY = 2**25
 
 
-@dataclass
-class Hierarchy:
-    """Nodes in depth-first order.
-
-    Attributes:
-        boxes: shape (nodes, 2, 3), int32; empty subtrees have low > high.
-        links: shape (nodes, 2), int32: (skip, item of a leaf or -1).
-    """
-
-    boxes: np.ndarray
-    links: np.ndarray
-
-
-def build_hierarchy(boxes: np.ndarray) -> Hierarchy:
-    """Hierarchy over boxes (n, 2, 3), int32; one box a leaf, exact integer bounds."""
-    count = len(boxes)
-    if count == 0:
-        return Hierarchy(np.zeros((0, 2, 3), np.int32), np.zeros((0, 2), np.int32))
-    depth = int(np.ceil(np.log2(count))) if count > 1 else 0
-    # The leaf of the i-th box in order: spread evenly, so that every subtree gets its share.
-    leaves = np.arange(count) * 2**depth // count
-    order = median_order(boxes.astype(np.int64).sum(axis=1), leaves, depth)
-    bounds = np.empty((2**depth, 2, 3), np.int32)
-    bounds[:, 0], bounds[:, 1] = EMPTY, -EMPTY
-    bounds[leaves] = boxes[order]
-    items = np.full(2**depth, -1, np.int32)
-    items[leaves] = order
-    node_boxes = np.empty((2 ** (depth + 1) - 1, 2, 3), np.int32)
-    links = np.full((2 ** (depth + 1) - 1, 2), -1, np.int32)
-    places = [np.zeros(1, np.int64)]
-    for level in range(depth):
-        left = places[-1] + 1
-        places.append(np.column_stack([left, left + 2 ** (depth - level) - 1]).ravel())
-    for level in range(depth, -1, -1):
-        node_boxes[places[level]] = bounds
-        links[places[level], 0] = places[level] + 2 ** (depth - level + 1) - 1
-        if level == depth:
-            links[places[level], 1] = items
-        pairs = bounds.reshape(-1, 2, 2, 3) if level else None
-        if pairs is not None:
-            bounds = np.stack([pairs[:, :, 0].min(axis=1), pairs[:, :, 1].max(axis=1)], axis=1)
-    return Hierarchy(node_boxes, links)
-
-
 def build_levels(boxes: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """The same tree level by level, for searches that take a whole level at once.
+    """Nodes of the hierarchy over boxes.
 
     Args:
         boxes: shape (n, 2, 3), integers.

@@ -18,7 +18,6 @@ from .blockers import Blockers
 from .curtains import LEAST_M2, NEAR_DEG, THIN_M, cuts_inside, face_normals, inside, largest_sections
 from .frame import LEAST_DEG
 from .graph import OTHER_AXES
-from .hierarchy import build_hierarchy
 from .occludees import Occludees, turned_occludees
 from .plans import Plans, box_corners, plan_bounds, turned_plan
 from .scene import GRID_LIMIT, OPAQUE, Scene, turned
@@ -153,7 +152,7 @@ def _walls(elements: list[np.ndarray], yaw: float, grid_m: float) -> Blockers:
             for k, found in _levels(flat, level, least):
                 _enter(boxes, axes, 2, _flat_boxes(found, 2, k))
     joined = np.concatenate(boxes).astype(np.int32)
-    return Blockers(joined, np.concatenate(axes).astype(np.int32), build_hierarchy(joined))
+    return Blockers(joined, np.concatenate(axes).astype(np.int32))
 
 
 def _enter(boxes: list[np.ndarray], axes: list[np.ndarray], axis: int, found: np.ndarray) -> None:

@@ -13,7 +13,6 @@ from scipy import ndimage
 
 from .blockers import Blockers, maximal_rectangles, paint
 from .graph import OTHER_AXES
-from .hierarchy import Hierarchy, build_hierarchy
 from .opaque import OpaquePlanes, edge_rectangles
 
 # Regions and pieces of furniture below this hide little and would fill the hierarchy.
@@ -45,7 +44,6 @@ class Regions:
         open_before: uncovered raster cells before (i, j), a summed-area table of len(u) x len(v) per region, int32.
         boxes: rectangles inside the regions, overlapping, none able to grow [grid steps], shape (boxes, 2, 3), int32.
         region: region of each rectangle, shape (boxes,), int32.
-        hierarchy: over the rectangles.
     """
 
     axis: np.ndarray
@@ -56,12 +54,11 @@ class Regions:
     open_before: np.ndarray
     boxes: np.ndarray
     region: np.ndarray
-    hierarchy: Hierarchy
 
     @property
     def blockers(self) -> Blockers:
         """The rectangles as a target search wants them."""
-        return Blockers(self.boxes, self.axis[self.region], self.hierarchy)
+        return Blockers(self.boxes, self.axis[self.region])
 
 
 def find_regions(
@@ -143,7 +140,6 @@ def _pack(found: list[tuple]) -> Regions:
         np.concatenate([empty, *tables]).astype(np.int32),
         joined,
         np.repeat(np.arange(len(found), dtype=np.int32), [len(part[5]) for part in found]),
-        build_hierarchy(joined),
     )
 
 

@@ -10,8 +10,9 @@ import numpy as np
 import warp as wp
 
 from ..data.plans import NO_PLANS, Plans
+from .hierarchy import real
 from .launch import CPU, Device, launch_rows
-from .sightline import PADDING, Triangles, launch_confirm, real
+from .sightline import PADDING, Triangles, launch_confirm
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 

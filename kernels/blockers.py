@@ -24,7 +24,8 @@ from .curtains import (
 from .ends import CORNERS, Ends, append_corner, append_order, end_missed, has_corner, plan_times
 from .fences import FENCE_WAYS, FIRST_FENCE, append_fence_way, fence_met, fence_of, may_miss
 from .graph import reflect_high, reflect_low
-from .launch import CPU, Device, node_columns
+from .hierarchy import build_hierarchy, larger, smaller
+from .launch import CPU, Device
 from .stab import LIST_CAPACITY, vec6i
 
 f64 = wp.float64
@@ -157,6 +158,28 @@ def curtain_share(lo: wp.vec3d, hi: wp.vec3d, time: f64, w: wp.vec3d, xi: wp.vec
 
 
 @wp.func
+def node_times(tree: BlockerTree, node: int, swift: wp.vec3d, xi: wp.vec3d) -> wp.vec2d:
+    """When a line enters a node's box and when it leaves it; later than it enters if it misses the box.
+
+    Args:
+        tree: with the node.
+        node: of the hierarchy.
+        swift: the line's w, negative on the axes that were mirrored; so the box need not be.
+        xi: of the line.
+    """
+    lo = tree.node_lo[node]
+    hi = tree.node_hi[node]
+    first = f64(-1.0e300)
+    last = f64(1.0e300)
+    for i in range(3):
+        a = swift[i] * f64(lo[i])
+        b = swift[i] * f64(hi[i])
+        first = larger(first, smaller(a, b) - xi[i])
+        last = smaller(last, larger(a, b) - xi[i])
+    return wp.vec2d(first, last)
+
+
+@wp.func
 def scan(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2i:
     """The strongest blocker that the line crosses between leaving source and entering target, and its sides' order.
 
@@ -177,17 +200,22 @@ def scan(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2i:
         enter_plan = wp.max(enter, plan_times(ends.t_plan, ends.turn, w, xi)[0] + f64(1.0e-6))
     best = wp.vec2i(CLEAR, 0)
     best_strength = f64(-100.0)
+    swift = w
+    for i in range(3):
+        if ((ends.octant >> i) & 1) == 1:
+            swift[i] = -w[i]
     node = int(0)
     count = tree.links.shape[0]
     while node < count:
         link = tree.links[node]
-        lo = reflect_low(tree.node_lo[node], tree.node_hi[node], ends.octant)
-        hi = reflect_high(tree.node_lo[node], tree.node_hi[node], ends.octant)
-        first = wp.max(w[0] * lo[0] - xi[0], wp.max(w[1] * lo[1] - xi[1], w[2] * lo[2] - xi[2]))
-        last = wp.min(w[0] * hi[0] - xi[0], wp.min(w[1] * hi[1] - xi[1], w[2] * hi[2] - xi[2]))
+        met = node_times(tree, node, swift, xi)
+        first = met[0]
+        last = met[1]
         if first <= last and first <= enter_plan and last >= leave_plan and (ends.strict == 0 or first < enter_plan):
             if link[1] >= 0:
                 axis = tree.axis[link[1]]
+                lo = reflect_low(tree.node_lo[node], tree.node_hi[node], ends.octant)
+                hi = reflect_high(tree.node_lo[node], tree.node_hi[node], ends.octant)
                 value = f64(-200.0)
                 share = wp.vec4d()
                 if axis < FIRST_CURTAIN:
@@ -381,4 +409,4 @@ def append_way(
 def blocker_tree(blockers: Blockers, device: Device = CPU) -> BlockerTree:
     """Copy blockers to a device."""
     lo, hi = (device.corners(blockers.boxes[:, side]) for side in (0, 1))
-    return device.struct(BlockerTree, lo=lo, hi=hi, axis=blockers.axis, **node_columns(blockers.hierarchy))
+    return device.struct(BlockerTree, lo=lo, hi=hi, axis=blockers.axis, **build_hierarchy(blockers.boxes).columns)

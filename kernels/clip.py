@@ -8,8 +8,8 @@ Source: Sutherland and Hodgman 1974, "Reentrant polygon clipping".
 import numpy as np
 import warp as wp
 
+from .hierarchy import real
 from .launch import CPU, Device, launch_rows
-from .sightline import real
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 

@@ -22,7 +22,7 @@ import numpy as np
 import warp as wp
 
 from ..data.errors import InputError
-from ..data.hierarchy import build_hierarchy
+from .hierarchy import build_hierarchy
 from .launch import CPU, Device, launch_rows
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -45,7 +45,7 @@ FAR = wp.constant(wp.float64(np.inf))
 
 @wp.struct
 class TriangleTree:
-    """Triangles (three corners each) and a hierarchy of boxes about them; links as of `data.hierarchy`."""
+    """Triangles (three corners each) and a hierarchy of boxes about them; links as of `kernels.hierarchy`."""
 
     lo: wp.array[wp.vec3d]
     hi: wp.array[wp.vec3d]

@@ -10,7 +10,6 @@ import numpy as np
 import warp as wp
 
 from ..data.errors import InputError
-from ..data.hierarchy import Hierarchy
 from ..data.scene import GRID_LIMIT
 
 # Rows a CPU thread takes at a time: small enough to balance, large enough to hide the launch (about 50 us).
@@ -83,11 +82,6 @@ class Device:
 
 
 CPU = Device()
-
-
-def node_columns(hierarchy: Hierarchy) -> dict[str, np.ndarray]:
-    """Columns of a hierarchy as Warp structs name them; boxes of empty nodes lie beyond the grid."""
-    return {"node_lo": hierarchy.boxes[:, 0], "node_hi": hierarchy.boxes[:, 1], "links": hierarchy.links}
 
 
 def check_coordinates(values: np.ndarray) -> None:

@@ -11,11 +11,10 @@ without its projection point.
 
 import warp as wp
 
-from ..data.hierarchy import build_hierarchy
 from ..data.patches import Patches
 from ..data.regions import Regions
-from .launch import CPU, Device, node_columns
-from .sightline import nears, real
+from .hierarchy import build_hierarchy, inverse, nears, real
+from .launch import CPU, Device
 
 f64 = wp.float64
 
@@ -51,16 +50,16 @@ class Shields:
 def device_shields(regions: Regions, patches: Patches, device: Device = CPU) -> Shields:
     """Copy occluders to a device."""
     names = ("axis", "plane", "places", "u", "v", "open_before", "region")
-    nodes = build_hierarchy(patches.boxes)
+    nodes = build_hierarchy(patches.boxes).columns
     return device.struct(
         Shields,
         **{name: getattr(regions, name) for name in names},
-        **node_columns(regions.hierarchy),
+        **build_hierarchy(regions.boxes).columns,
         corners=device.corners(patches.corners),
         starts=patches.starts,
         normal=patches.normal,
         depth=patches.depth,
-        **{f"patch_{name.removeprefix('node_')}": column for name, column in node_columns(nodes).items()},
+        **{f"patch_{name.removeprefix('node_')}": column for name, column in nodes.items()},
     )
 
 
@@ -299,9 +298,10 @@ def blocking_region(shields: Shields, shaft: Shaft, p: wp.vec3d, d: wp.vec3d) ->
     tried = int(-1)
     node = int(0)
     count = shields.links.shape[0]
+    back = inverse(d)
     while node < count:
         link = shields.links[node]
-        if nears(p, d, real(shields.node_lo[node]), real(shields.node_hi[node]), NEAR):
+        if nears(p, back, real(shields.node_lo[node]), real(shields.node_hi[node]), NEAR):
             if link[1] >= 0:
                 region = shields.region[link[1]]
                 met = 0
@@ -321,9 +321,10 @@ def next_patch(shields: Shields, start: int, p: wp.vec3d, d: wp.vec3d) -> int:
     """Node, from `start` on, of a patch that the segment p + [0, 1] d may meet; past the last if there is none."""
     node = int(start)
     count = shields.patch_links.shape[0]
+    back = inverse(d)
     while node < count:
         link = shields.patch_links[node]
-        if nears(p, d, real(shields.patch_lo[node]), real(shields.patch_hi[node]), NEAR):
+        if nears(p, back, real(shields.patch_lo[node]), real(shields.patch_hi[node]), NEAR):
             if link[1] >= 0 and winds(shields, link[1], p, d):
                 return node
             node += 1

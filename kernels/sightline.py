@@ -10,8 +10,8 @@ Source of the bound: Shewchuk 1997, "Adaptive Precision Floating-Point Arithmeti
 import numpy as np
 import warp as wp
 
-from ..data.hierarchy import build_hierarchy
-from .launch import CPU, Device, check_coordinates, launch_rows, node_columns
+from .hierarchy import build_hierarchy, inverse, nears, real
+from .launch import CPU, Device, check_coordinates, launch_rows
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -60,13 +60,7 @@ def device_triangles(
     a, b, c = (device.corners(triangles[:, i]) for i in range(3))
     opaque = np.ones(len(triangles), bool) if opaque is None else opaque
     columns = {"a": a, "b": b, "c": c, "owner": owners, "opaque": opaque, "running_area": area}
-    return device.struct(Triangles, **columns, **node_columns(nodes))
-
-
-@wp.func
-def real(v: wp.vec3i) -> wp.vec3d:
-    """Integer vector as float64."""
-    return wp.vec3d(f64(v[0]), f64(v[1]), f64(v[2]))
+    return device.struct(Triangles, **columns, **nodes.columns)
 
 
 @wp.func
@@ -119,33 +113,14 @@ def hits(p: wp.vec3d, q: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> boo
 
 
 @wp.func
-def nears(p: wp.vec3d, d: wp.vec3d, lo: wp.vec3d, hi: wp.vec3d, padding: f64) -> bool:
-    """Whether the segment p + [0, 1] d meets a box that is padded on all sides, in rounded arithmetic."""
-    first = f64(0.0)
-    last = f64(1.0)
-    for i in range(3):
-        low = lo[i] - padding - p[i]
-        high = hi[i] + padding - p[i]
-        if d[i] == f64(0.0):
-            if low > f64(0.0) or high < f64(0.0):
-                last = f64(-1.0)
-        else:
-            t0 = low / d[i]
-            t1 = high / d[i]
-            first = wp.max(first, wp.min(t0, t1))
-            last = wp.min(last, wp.max(t0, t1))
-    return first <= last
-
-
-@wp.func
 def obstacle(scene: Triangles, p: wp.vec3d, q: wp.vec3d, except_owner: int) -> int:
     """An opaque triangle that pq does not certainly clear, or -1; those of one object excepted (-1: none)."""
-    d = q - p
+    back = inverse(q - p)
     count = scene.links.shape[0]
     node = int(0)
     while node < count:
         link = scene.links[node]
-        if nears(p, d, real(scene.node_lo[node]), real(scene.node_hi[node]), PADDING):
+        if nears(p, back, real(scene.node_lo[node]), real(scene.node_hi[node]), PADDING):
             item = link[1]
             if item >= 0:
                 if scene.owner[item] != except_owner and scene.opaque[item] != wp.uint8(0):

@@ -3,7 +3,6 @@
 import numpy as np
 from viewcell.data.blockers import Blockers
 from viewcell.data.graph import OTHER_AXES
-from viewcell.data.hierarchy import build_hierarchy
 
 SIZE = 16
 
@@ -11,7 +10,7 @@ SIZE = 16
 def blockers_of(boxes: np.ndarray) -> Blockers:
     boxes = np.asarray(boxes, np.int32).reshape(-1, 2, 3)
     axis = (boxes[:, 1] == boxes[:, 0]).argmax(axis=1).astype(np.int32)
-    return Blockers(boxes, axis, build_hierarchy(boxes))
+    return Blockers(boxes, axis)
 
 
 def random_blockers(random: np.random.Generator, count: int) -> np.ndarray:

@@ -7,7 +7,6 @@ from fractions import Fraction
 import numpy as np
 from viewcell.data.blockers import Blockers
 from viewcell.data.curtains import FALLING, RISING
-from viewcell.data.hierarchy import build_hierarchy
 from viewcell.data.plans import Plans
 from viewcell.data.verdict import Verdict
 from viewcell.kernels.blockers import blocker_tree
@@ -38,7 +37,7 @@ class Oblique:
 
     def blockers(self) -> Blockers:
         boxes = np.sort(self.quads, axis=1).astype(np.int32)
-        return Blockers(boxes, np.array([kind_of(quad) for quad in self.quads], np.int32), build_hierarchy(boxes))
+        return Blockers(boxes, np.array([kind_of(quad) for quad in self.quads], np.int32))
 
     def known(self) -> dict[int, Blocker]:
         """The same for the checker."""

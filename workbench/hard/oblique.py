@@ -7,7 +7,6 @@ import numpy as np
 
 from ...data.blockers import Blockers
 from ...data.curtains import FALLING, RISING
-from ...data.hierarchy import build_hierarchy
 from ...data.plans import Plans
 from ...kernels.blockers import BlockerTree, blocker_tree
 from ...kernels.launch import Device
@@ -45,7 +44,7 @@ def oblique_questions(cases: HardCases, device: Device) -> Iterator[ObliqueQuest
         plans = Plans(np.array(rows, np.int64), np.array([ends[n].plan for n in rows], np.int32).reshape(-1, 4, 2))
         if walls:
             axis, around = np.array([wall.axis for wall in walls]), np.array([wall.box for wall in walls], np.int32)
-            tree = blocker_tree(Blockers(around, axis.astype(np.int32), build_hierarchy(around)), device)
+            tree = blocker_tree(Blockers(around, axis.astype(np.int32)), device)
             partial = len(walls) < len(case.occluders) or _on_face(case)
             yield ObliqueQuestion(case, tree, dict(enumerate(walls)), boxes, plans, ends, partial)
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from ...data.blockers import Blockers
 from ...data.graph import CellGraph
-from ...data.hierarchy import build_hierarchy
 from ...data.scene import GRID_LIMIT
 from ...data.verdict import Verdict
 from ...kernels.aim import launch_aim
@@ -148,7 +147,7 @@ def _axial_regions(cases: HardCases, device: Device) -> Iterator[_AxialRegion]:
         ends = np.array([case.cell, case.target], np.int32)
         yield _AxialRegion(
             case,
-            blocker_tree(Blockers(boxes, axis, build_hierarchy(boxes)), device),
+            blocker_tree(Blockers(boxes, axis), device),
             {number: Blocker(int(axis[number]), box.tolist()) for number, box in enumerate(boxes)},
             ends,
             bool((flat & ((boxes[:, 0] == ends[1, 0]) | (boxes[:, 0] == ends[1, 1]))).any()),

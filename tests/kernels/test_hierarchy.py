@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from viewcell.data.hierarchy import build_hierarchy
+from viewcell.kernels.hierarchy import build_hierarchy
 
 
 def random_boxes(rng, count):
@@ -56,3 +56,37 @@ def test_a_small_query_looks_at_few_nodes():
     tree = build_hierarchy(np.stack([low, low + 1], axis=1).astype(np.int32))
     found, looked = items_met(tree, np.array([[4, 4, 4], [4, 4, 4]]))
     assert len(found) == 1 and looked < 100
+
+
+def test_every_node_is_the_box_around_what_it_holds():
+    boxes = random_boxes(np.random.default_rng(5), 60)
+    tree = build_hierarchy(boxes)
+    for node, (skip, item) in enumerate(tree.links.tolist()):
+        held = tree.links[node:skip, 1]
+        held = boxes[held[held >= 0]]
+        assert (item >= 0) == (skip == node + 1)
+        np.testing.assert_array_equal(tree.boxes[node], [held[:, 0].min(axis=0), held[:, 1].max(axis=0)])
+
+
+def test_boxes_of_all_sizes_end_in_few_levels_of_waiting():
+    """Each box is twice as large as the one before and holds it, and all stand a hundred times."""
+    size = 2 ** np.arange(20)
+    boxes = np.stack([-np.stack([size] * 3, axis=1), np.stack([size] * 3, axis=1)], axis=1).astype(np.int32)
+    boxes = np.tile(boxes, (100, 1, 1))
+    tree = build_hierarchy(boxes)
+    assert sorted(tree.links[tree.links[:, 1] >= 0, 1]) == list(range(len(boxes)))
+
+
+def test_walls_do_not_spread_over_the_tree():
+    """Among walls and slabs as large as the building, a line through one room looks at little else than that room."""
+    planes = np.arange(0, 320, 20)
+    low = np.stack(np.meshgrid(planes, planes, planes, indexing="ij"), axis=-1).reshape(-1, 3)
+    boxes = [np.stack([low + 2, low + 4], axis=1)]
+    for axis in range(3):
+        walls = np.tile([[0, 0, 0], [320, 320, 320]], (len(planes), 1, 1))
+        walls[:, :, axis] = planes[:, None]
+        boxes.append(walls)
+    tree = build_hierarchy(np.concatenate(boxes).astype(np.int32))
+    rooms = [np.array([x, y, z]) for x in (1, 101) for y in (41, 161) for z in (21, 201, 281)]
+    looked = [items_met(tree, np.stack([room, room + np.array([18, 0, 0])]))[1] for room in rooms]
+    assert max(looked) < 80, looked
