@@ -36,6 +36,16 @@ class _Open(threading.local):
 _OPEN = _Open()
 
 
+def open_here() -> "tuple[list[Phase], Progress | None]":
+    """What is going on in this thread, for `go_on` in another one."""
+    return list(_OPEN.phases), _OPEN.screen
+
+
+def go_on(found: "tuple[list[Phase], Progress | None]") -> None:
+    """Let phases of this thread be within those of the one that has begun it."""
+    _OPEN.phases, _OPEN.screen = list(found[0]), found[1]
+
+
 class Phase:
     """A phase of some work, counted in units of it where these are known.
 

@@ -2,19 +2,35 @@
 
 import os
 import threading
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import warp as wp
 
 from ..data.errors import InputError
+from ..data.progress import go_on, open_here
 from ..data.scene import GRID_LIMIT
 
 # Rows a CPU thread takes at a time: small enough to balance, large enough to hide the launch (about 50 us).
 CHUNK = 1024
 GPU_SLOTS = 8192
+
+Work, Answer = TypeVar("Work"), TypeVar("Answer")
+
+
+class _Lane(threading.local):
+    """What a thread that works beside others may use: how many threads of its own, and until it is told to stop."""
+
+    threads: int | None = None
+    stopped: threading.Event | None = None
+
+
+_LANE = _Lane()
+# Modules are compiled one at a time.
+_LOADING = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -43,6 +59,11 @@ class Device:
         # Cores this process may use, not those of the machine; not every system can tell.
         allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
         return cls(name, threads or allowed or 1)
+
+    @property
+    def threads_here(self) -> int:
+        """CPU threads for work of the calling thread: its share, where it is one of several (`side_by_side`)."""
+        return _LANE.threads or self.threads
 
     @property
     def is_cpu(self) -> bool:
@@ -90,6 +111,50 @@ def check_coordinates(values: np.ndarray) -> None:
     most = max(values.max(initial=0), -values.min(initial=0))
     if not most <= GRID_LIMIT:
         raise InputError(f"coordinates: expected at most {GRID_LIMIT} grid steps from the origin, found {most}")
+
+
+def lanes(count: int, device: Device) -> int:
+    """How many of so many pieces of work `side_by_side` does at a time."""
+    return max(1, min(device.threads_here, count)) if device.is_cpu else 1
+
+
+def side_by_side(do: Callable[[Work], Answer], work: Sequence[Work], device: Device) -> Iterator[tuple[int, Answer]]:
+    """Do pieces of work that do not depend on each other, on CPU threads that share those of the device.
+
+    What Python does between launches then goes on while others launch. Answers may not depend on it.
+
+    Yields:
+        Place and answer of each piece, as they are done. When the caller gives up, the others end with what they launch
+        next.
+    """
+    count = lanes(len(work), device)
+    if count == 1:
+        yield from enumerate(map(do, work))
+        return
+    stopped, above = threading.Event(), open_here()
+
+    def begin() -> None:
+        _LANE.threads, _LANE.stopped = device.threads_here // count or 1, stopped
+        go_on(above)
+
+    with ThreadPoolExecutor(count, initializer=begin) as pool:
+        places = {pool.submit(do, piece): place for place, piece in enumerate(work)}
+        try:
+            for done in as_completed(places):
+                yield places[done], done.result()
+        finally:
+            stopped.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def check_stopped() -> None:
+    """End what this thread does if others have given up.
+
+    Raises:
+        KeyboardInterrupt: as in the thread that was interrupted.
+    """
+    if _LANE.stopped is not None and _LANE.stopped.is_set():
+        raise KeyboardInterrupt
 
 
 @dataclass(frozen=True)
@@ -170,8 +235,10 @@ def run_sliced(
     """
     if count == 0:
         return
+    check_stopped()
     # As a launch does: Module.load alone compiles a second variant on a CPU, for blocks of many threads.
-    wp.load_module(module, device=device.name)
+    with _LOADING:
+        wp.load_module(module, device=device.name)
 
     def slotted(slots: int) -> tuple[object, ...]:
         return () if scratch is None else (slots, *scratch.arrays(slots, device))
@@ -183,7 +250,7 @@ def run_sliced(
             launch(first, min(first + step, count), *mine)
         wp.synchronize_device(device.name)
         return
-    threads = max(1, min(device.threads, -(-count // chunk)))
+    threads = max(1, min(device.threads_here, -(-count // chunk)))
     starts = iter(range(0, count, chunk))
     lock = threading.Lock()
 
@@ -194,6 +261,7 @@ def run_sliced(
                 first = next(starts, None)
             if first is None:
                 return
+            check_stopped()
             launch(first, min(first + chunk, count), *mine)
 
     if threads == 1:

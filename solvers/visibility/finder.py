@@ -6,6 +6,8 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
+from ...kernels.launch import Device
+
 # Rays that a thread casts at a time.
 RUN = 1 << 14
 
@@ -18,9 +20,9 @@ class Finder:
         owners: object of each, and -1 for none, shape (m + 1,), int.
     """
 
-    def __init__(self, triangles: np.ndarray, owners: np.ndarray, opaque: np.ndarray, threads: int) -> None:
+    def __init__(self, triangles: np.ndarray, owners: np.ndarray, opaque: np.ndarray, device: Device) -> None:
         """Build the scene of those triangles that are opaque, shape (m,), bool."""
-        self.triangles, self.owners, self._threads, self._scene = triangles, np.append(owners, -1), threads, None
+        self.triangles, self.owners, self._device, self._scene = triangles, np.append(owners, -1), device, None
         self._index = np.append(np.flatnonzero(opaque), -1)
         if opaque.any():
             self._scene = EmbreeScene(robust=True)
@@ -48,7 +50,8 @@ class Finder:
             return self._index[self._scene.run(start.astype(np.float32), ways.astype(np.float32), dists=reach)]
 
         runs = range(0, len(origins), RUN)
-        if self._threads == 1 or len(runs) < 2:
+        threads = self._device.threads_here
+        if threads == 1 or len(runs) < 2:
             return np.concatenate([np.zeros(0, int), *map(cast, runs)])
-        with ThreadPoolExecutor(self._threads) as pool:
+        with ThreadPoolExecutor(threads) as pool:
             return np.concatenate(list(pool.map(cast, runs)))

@@ -1,6 +1,7 @@
 """Visibility of a model from the cells of its cell-and-portal graph: of cells and of objects."""
 
-from functools import cached_property, partial
+from functools import partial
+from threading import Lock
 
 import numpy as np
 import warp as wp
@@ -58,6 +59,7 @@ class PortalEngine:
             certify: call hidden only what has a certificate, and keep it. All methods then hide by the model's
                 occluders, which can be checked against the model alone; "portals" leaves out oblique ones for cells.
         """
+        self._occluders, self._making = None, Lock()
         self._certify, self._least_unknown = certify, LEAST_UNKNOWN[method]
         self._objects = len(model.scene.objects)
         tiles = graph.tiles
@@ -71,13 +73,16 @@ class PortalEngine:
         """As of `Engine`."""
         return self.model.blockers, self._sights.model.regions, self._sights.model.patches
 
-    @cached_property
+    @property
     def occluders(self) -> OccluderModel:
-        """Occluders of the model, made when they are first asked."""
-        # Once for all blocks: what takes them no longer says nothing of the rest.
-        with phase("occluders"):
-            wp.load_module(shaft.__name__, device=self.model.device.name)
-            return OccluderModel.of(self._sights, frames=not self._certify)
+        """Occluders of the model, made when they are first asked, by one thread for all."""
+        with self._making:
+            if self._occluders is None:
+                # Once for all blocks: what takes them no longer says nothing of the rest.
+                with phase("occluders"):
+                    wp.load_module(shaft.__name__, device=self.model.device.name)
+                    self._occluders = OccluderModel.of(self._sights, frames=not self._certify)
+            return self._occluders
 
     def compile(self) -> None:
         """As of `Engine`."""

@@ -1,16 +1,19 @@
 """What all launchers share: coordinates beyond the grid are refused, and every item is done once."""
 
+import threading
+
 import numpy as np
 import pytest
 import warp as wp
 from builders import random_solids
 from builders.blocker_scenes import blockers_of
+from viewcell.data import progress
 from viewcell.data.errors import InputError
 from viewcell.data.solids import closed_elements
 from viewcell.kernels.backface import build_cones, launch_backface
 from viewcell.kernels.blockers import blocker_tree
 from viewcell.kernels.coverage import launch_coverage
-from viewcell.kernels.launch import CPU, Device, check_coordinates, run_sliced
+from viewcell.kernels.launch import CPU, Device, check_coordinates, lanes, run_sliced, side_by_side
 from viewcell.kernels.line_tree import launch_line_trees
 from viewcell.kernels.occludee import launch_occludees
 from viewcell.kernels.shaft import launch_shaft
@@ -95,3 +98,47 @@ def test_a_launch_compiles_one_variant():
     LAUNCHERS["backface"](np.array([[[-9, -8, -7], [-1, -2, -3]], [[1, 2, 3], [9, 8, 7]]]))
     module = wp.get_module("viewcell.kernels.backface")
     assert [block for context, block in module.execs if context == wp.get_device("cpu").context] == [1]
+
+
+@pytest.mark.parametrize("device", [CPU, Device("cpu", 3), AsGpu("cpu", 3)], ids=["cpu", "threads", "gpu"])
+def test_work_side_by_side_is_done_once_and_keeps_its_place(device):
+    found = dict(side_by_side(lambda piece: piece**2, range(7), device))
+    assert found == {place: place**2 for place in range(7)}
+    assert dict(side_by_side(str, [], device)) == {}
+
+
+def test_work_side_by_side_shares_the_threads_of_the_device():
+    device = Device("cpu", 5)
+    seen = dict(side_by_side(lambda _: (device.threads_here, lanes(9, device)), range(2), device))
+    assert seen == {0: (2, 2), 1: (2, 2)} and device.threads_here == 5
+    assert lanes(3, device) == 3 and lanes(9, AsGpu("cpu", 5)) == 1
+
+
+def test_phases_of_work_side_by_side_are_within_those_of_the_caller():
+    def inner(piece):
+        with progress.phase(f"piece {piece}") as mine:
+            return progress.open_here()[0][:-1], mine in progress.open_here()[0]
+
+    with progress.phase("all") as outer:
+        found = dict(side_by_side(inner, range(4), Device("cpu", 2)))
+    assert all(above == [outer] and within for above, within in found.values())
+
+
+def test_when_one_fails_the_others_end_with_what_they_launch_next():
+    started, ended = threading.Event(), []
+
+    def endless(piece):
+        if piece == 0:
+            started.wait(10)
+            raise ValueError("the first")
+        try:
+            while True:
+                started.set()
+                run_sliced(lambda first, last: None, 1, wp.get_module("viewcell.kernels.launch"), CPU)
+        except KeyboardInterrupt:
+            ended.append(piece)
+            raise
+
+    with pytest.raises(ValueError, match="the first"):
+        list(side_by_side(endless, range(5), Device("cpu", 2)))
+    assert 1 in ended

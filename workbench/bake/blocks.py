@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -18,7 +18,10 @@ from .cells import Sources
 from .settings import CellSettings
 
 if TYPE_CHECKING:
+    from ...kernels.launch import Device
     from ...solvers.visibility.engine import Engine, Part
+
+Item = TypeVar("Item")
 
 # Looks around from every view cell before anything else under a budget: share of the time at most, number at most, and
 # the share by which a look has to add to what is seen for there to be another.
@@ -29,6 +32,8 @@ PARTIAL = ".partial"
 BLOCK = 24
 # View cells per block: their sets are larger.
 VIEW_BLOCK = 8
+# Threads take blocks: a model of few sources is cut into so many, of no fewer sources than this.
+BLOCKS, LEAST_BLOCK = 4, 3
 # Looking for witnesses takes so many times as long as telling what is hidden, where it was not measured.
 GUESSED = 2.0
 
@@ -95,6 +100,7 @@ class Work:
 
     Attributes:
         engine: that computes them.
+        device: where it does, and on how many threads.
         store: of finished ones.
         bar: how far it is, in cells.
         deadline: when no more is begun, of `time.perf_counter`.
@@ -102,62 +108,92 @@ class Work:
     """
 
     engine: "Engine"
+    device: "Device"
     store: Store
     bar: Phase
     deadline: float = np.inf
     started: float = 0.0
 
-    def finish(self, name: int | str, block: np.ndarray) -> "Part":
-        """A block as far as it goes, from the store if it is there."""
+    @property
+    def width(self) -> int:
+        """Blocks that are computed at a time."""
+        from ...kernels.launch import lanes
+
+        return lanes(self.device.threads, self.device)
+
+    def finish(self, named: "tuple[int | str, np.ndarray]") -> "Part":
+        """A block with a name as far as it goes, from the store if it is there."""
+        name, block = named
         part = self.store.load(name)
         if part is None:
             part = self.engine.visible(block)
             self.store.save(name, part)
-        self.bar.update(len(block))
         return part
+
+    def hide(self, block: np.ndarray) -> "Part":
+        """What is hidden from a block of cells."""
+        return self.engine.visible(block, aim=False)
+
+    def finish_all(self, named: "list[tuple[int | str, np.ndarray]]") -> "list[Part]":
+        """Blocks as far as they go, side by side; counts their cells."""
+        return self._each(self.finish, named, [len(block) for _, block in named])
+
+    def _each(self, do: "Callable[[Item], Part]", work: "list[Item]", cells: list[int]) -> "list[Part]":
+        """What `do` returns for each piece of work, side by side, in order; counts so many cells for each."""
+        from ...kernels.launch import side_by_side
+
+        parts = {}
+        for place, part in side_by_side(do, work, self.device):
+            parts[place] = part
+            self.bar.update(cells[place])
+        return [parts[place] for place in range(len(work))]
 
     def all_parts(self, blocks: list[np.ndarray]) -> "tuple[list[Part], Shortfall | None]":
         """All blocks, and what the deadline left of them, if it ended them early: that is unknown, never hidden."""
         if np.isinf(self.deadline):
-            return [self.finish(number, block) for number, block in enumerate(blocks)], None
+            return self.finish_all(list(enumerate(blocks))), None
         # First what is seen at a glance, then what is hidden from each, then witnesses where most is unknown.
-        glances = self._glance(blocks)
-        parts, rough, raw, rest = [], [], [], []
-        first = _Rate()
+        glances, stored = self._glance(blocks), {}
         for number, block in enumerate(blocks):
             part = self.store.load(number)
             if part is not None:
+                stored[number] = part
                 self.bar.update(len(block))
-            elif first.fits(len(block), self.deadline):
-                rough.append(number)
-                part = first.take(len(block), lambda block=block: self.engine.visible(block, aim=False))
-            else:
-                raw.append(number)
-                # As much of it as there is time for.
-                some = block[: first.room(self.deadline)]
-                if len(some):
-                    rest.append(first.take(len(some), lambda some=some: self.engine.visible(some, aim=False)))
-                part = self.engine.unknown(block[len(some) :])
-            parts.append(part)
-        rough.sort(key=lambda number: -parts[number].unknown_count)
+        raw, hidden, first = [number for number in range(len(blocks)) if number not in stored], {}, _Rate()
+        while raw and first.fits(_cells(blocks, now := raw[: self.width]), self.deadline):
+            del raw[: self.width]
+            hidden |= zip(now, self._timed(first, self.hide, [blocks[number] for number in now]), strict=True)
+        # As much of the others as there is time for.
+        left = np.concatenate([np.zeros(0, int), *(blocks[number] for number in raw)])
+        some = left[: first.room(self.deadline)]
+        rest = self._timed(first, self.hide, [some[k :: self.width] for k in range(self.width) if k < len(some)])
+        for number in raw:
+            hidden[number] = self.engine.unknown(np.setdiff1d(blocks[number], some))
+        rough = sorted(set(hidden) - set(raw), key=lambda number: (-hidden[number].unknown_count, number))
         # Witnesses take as long again where none were looked for yet, or several times so.
         full = _Rate(guess=GUESSED * first.each)
-        while rough and full.fits(len(blocks[rough[0]]), self.deadline):
-            number = rough.pop(0)
-            block = blocks[number]
-            parts[number] = full.take(len(block), lambda number=number, block=block: self.finish(number, block))
+        while rough and full.fits(_cells(blocks, now := rough[: self.width]), self.deadline):
+            del rough[: self.width]
+            named = [(number, blocks[number]) for number in now]
+            hidden |= zip(now, full.take(_cells(blocks, now), lambda named=named: self.finish_all(named)), strict=True)
+        parts = [(stored | hidden)[number] for number in range(len(blocks))]
         for part in parts:
             part.objects.adopt(glances)
         left = raw + rough
         if not left:
             return parts, None
-        counts = [sum(len(blocks[number]) for number in numbers) for numbers in (raw, left)]
         needed = None
         if first.cells:
-            needed = time.perf_counter() - self.started + counts[0] * first.each + counts[1] * full.each
-        parts += rest
+            needed = time.perf_counter() - self.started
+            needed += _cells(blocks, raw) * first.each + _cells(blocks, left) * full.each
         pairs = sum(part.unknown_count for part in [*(parts[number] for number in left), *rest])
-        return parts, Shortfall("hiding" if raw else "witnesses", counts[1], pairs, needed)
+        short = Shortfall("hiding" if raw else "witnesses", _cells(blocks, left), pairs, needed)
+        return parts + rest, short
+
+    def _timed(self, rate: "_Rate", do: "Callable[[np.ndarray], Part]", work: list[np.ndarray]) -> "list[Part]":
+        """As `_each`, of blocks whose cells are not done by it; timed."""
+        none = [0] * len(work)
+        return rate.take(sum(map(len, work)), lambda: self._each(do, work, none))
 
     def _glance(self, blocks: list[np.ndarray]) -> Rows:
         """Objects seen from the cells of all blocks in a few looks around, while a look shows enough more; ordered."""
@@ -194,13 +230,18 @@ class _Rate:
         """View cells that are done by a deadline; none where nothing is known."""
         return max(0, int((deadline - time.perf_counter()) / self.each)) if self.each else 0
 
-    def take(self, cells: int, do: "Callable[[], Part]") -> "Part":
+    def take(self, cells: int, do: "Callable[[], list[Part]]") -> "list[Part]":
         """What `do` returns, timed."""
         start = time.perf_counter()
-        part = do()
+        parts = do()
         self.cells += cells
         self.seconds += time.perf_counter() - start
-        return part
+        return parts
+
+
+def _cells(blocks: list[np.ndarray], numbers: list[int]) -> int:
+    """View cells of some blocks."""
+    return sum(len(blocks[number]) for number in numbers)
 
 
 def in_blocks(sources: Sources) -> list[np.ndarray]:
@@ -210,7 +251,7 @@ def in_blocks(sources: Sources) -> list[np.ndarray]:
     """
     cells = np.flatnonzero(sources.graph.inhabitable)
     size = VIEW_BLOCK if sources.view_cells else BLOCK if sources.model is not None else len(cells)
-    count = -(-len(cells) // max(1, size))
+    count = max(-(-len(cells) // max(1, size)), min(BLOCKS, len(cells) // LEAST_BLOCK) if sources.model else 0)
     return [cells[place::count] for place in range(count)]
 
 
@@ -237,19 +278,21 @@ def refine(
         work.engine = engine.from_cells(families[alive].astype(np.int32))
         fresh, count, rate = [], 0, _Rate()
         work.bar.grow(int(alive.sum()))
-        for number, size in enumerate(alive.sum(axis=1)):
-            if not rate.fits(1, work.deadline):
+        for begin in range(0, len(parents), work.width):
+            sizes_now = alive[begin : begin + work.width].sum(axis=1)
+            if not rate.fits(len(sizes_now), work.deadline):
                 # What is left of this level stays as it is: unrefined, never hidden.
-                coarse[parents[number:]] = False
-                short = _unrefined(work, parts, parents[number:], rate)
+                coarse[parents[begin:]] = False
+                short = _unrefined(work, parts, parents[begin:], rate)
                 break
-            block = np.arange(count, count + size)
-            count += int(size)
-            if size:
+            named = []
+            for size in sizes_now[sizes_now > 0]:
+                block = np.arange(count, count + size)
+                count += int(size)
                 # Which cells come to be refined may depend on the budget: a block is known by its cells, too.
                 held = hashlib.sha256(work.engine.model.cells[block].tobytes()).hexdigest()[:16]
-                name = f"{level}-{block[0]}-{held}"
-                fresh.append(rate.take(1, lambda name=name, block=block: work.finish(name, block)))
+                named.append((f"{level}-{block[0]}-{held}", block))
+            fresh += rate.take(len(named), lambda named=named: work.finish_all(named))
         place = np.cumsum(~coarse) - 1 + sum(map(len, leaves))
         kept += [part.relabelled(np.where(coarse, -1, place)) for part in parts]
         leaves.append(cells[~coarse])

@@ -114,7 +114,7 @@ def _bake(model: Scene | str | Path, settings: Settings, overwrite: bool, tuned:
     out, clock = run.out, run.clock
     clock.show("read")
     scene, graph_folder = open_model(model, settings)
-    known = fingerprint(scene, graph_folder, settings, (blocks.BLOCK, blocks.VIEW_BLOCK))
+    known = fingerprint(scene, graph_folder, settings, (blocks.BLOCK, blocks.VIEW_BLOCK, blocks.BLOCKS))
     if not overwrite and (done := held_manifest(out, "bake")) is not None:
         if done.get("fingerprint") != known:
             raise occupied(out, done, settings)
@@ -289,7 +289,7 @@ def _visibility(
     cut = in_blocks(sources)
     bar = clock.show("visibility", sum(map(len, cut)), "cell")
     deadline = np.inf if run.budget_s is None else started + run.budget_s
-    work = Work(engine, Store(partial_folder(run.out, run.known)), bar, deadline, started)
+    work = Work(engine, run.device, Store(partial_folder(run.out, run.known)), bar, deadline, started)
     parts, short = work.all_parts(cut)
     if sources.octree:
         parts, unrefined = refine(sources, work, parts, settings)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from builders import random_buildings
+from viewcell.kernels.launch import CPU, Device
 from viewcell.solvers.visibility.finder import RUN, Finder
 from viewcell.verify.exact.sightline import Sight, Sightlines
 
@@ -12,7 +13,14 @@ def asked(seed, count, threads=1):
     opaque = owners % 3 > 0
     rng = np.random.default_rng(seed)
     origins, ends = np.round(rng.uniform(-200, 1200, (2, count, 3)) * 1024) / 1024
-    return triangles, owners, opaque, origins, ends, Finder(triangles, owners, opaque, threads).first(origins, ends)
+    return (
+        triangles,
+        owners,
+        opaque,
+        origins,
+        ends,
+        Finder(triangles, owners, opaque, Device(threads=threads)).first(origins, ends),
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -40,7 +48,7 @@ def test_threads_and_runs_change_nothing():
 
 
 def test_without_triangles_everything_is_clear():
-    none = Finder(np.zeros((0, 3, 3), np.int32), np.zeros(0, int), np.zeros(0, bool), 1)
+    none = Finder(np.zeros((0, 3, 3), np.int32), np.zeros(0, int), np.zeros(0, bool), CPU)
     assert (none.first(np.zeros((2, 3)), np.ones((2, 3))) == -1).all()
     assert none.may_be_clear(np.arange(2), np.zeros((2, 3)), np.ones((2, 3))).all()
     assert none.wanted(np.arange(2), np.zeros(2, bool)).all()

@@ -77,20 +77,20 @@ def test_a_budget_that_ends_early_is_told(office, tmp_path):
 def test_a_budget_that_ends_in_the_middle_advises_one_that_is_enough(office, tmp_path, monkeypatch):
     """Every cell takes a second, and with witnesses two more; with witnesses as guessed, and as measured."""
     clock = Clock(monkeypatch, {False: 1.0, True: 2.0})
-    facts = viewcell.bake(office, tmp_path / "a", budget_s=3.5).manifest
+    facts = viewcell.bake(office, tmp_path / "a", threads=1, budget_s=3.5).manifest
     count = facts["counts"]["inhabitable"]
     assert clock.calls == [False] * 3
     assert facts["budget"] | {"pairs": 0} == {
         "budget_s": 3.5, "phase": "hiding", "cells": count, "pairs": 0, "needed_s": 3.0 * count,
     }  # fmt: skip
-    facts = viewcell.bake(office, tmp_path / "b", budget_s=count + 4.5).manifest
+    facts = viewcell.bake(office, tmp_path / "b", threads=1, budget_s=count + 4.5).manifest
     assert clock.calls[3:] == [False] * count + [True] * 2
     assert facts["budget"]["phase"] == "witnesses" and facts["budget"]["cells"] == count - 2
     assert facts["budget"]["needed_s"] == 3.0 * count
     assert 0 < facts["budget"]["pairs"] < facts["counts"]["cell_pairs"] + facts["counts"]["object_pairs"]
     advised = float(facts["warnings"][-1].partition("--budget ")[2].partition(" ")[0])
     assert 3.0 * count < advised < 4.0 * count
-    assert viewcell.bake(office, tmp_path / "c", budget_s=advised).manifest["budget_spent"] is False
+    assert viewcell.bake(office, tmp_path / "c", threads=1, budget_s=advised).manifest["budget_spent"] is False
 
 
 class Clock:
@@ -118,7 +118,7 @@ def test_an_octree_that_is_not_refined_is_told(office, tmp_path, monkeypatch):
     settings = Settings(method="occluders", cell_size_m=8.0, depth=1, refine_triangles=1)
     roots = viewcell.bake(office, tmp_path / "roots", settings=replace(settings, depth=0)).graph.cell_count
     Clock(monkeypatch, {False: 1.0, True: 1.0}, ViewCellEngine)
-    facts = viewcell.bake(office, tmp_path / "tree", settings=settings, budget_s=2 * roots + 2.5).manifest
+    facts = viewcell.bake(office, tmp_path / "tree", settings=settings, threads=1, budget_s=2 * roots + 2.5).manifest
     assert facts["budget"] | {"pairs": 0} == {
         "budget_s": 2 * roots + 2.5, "phase": "octree", "cells": roots - 2, "pairs": 0, "needed_s": 3.0 * roots,
     }  # fmt: skip
