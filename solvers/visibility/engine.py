@@ -76,6 +76,9 @@ class Engine(Protocol):
     def glance(self, block: np.ndarray, number: int) -> Rows:
         """Objects that some sources see at a glance, seen pairs only, ordered; others with each number."""
 
+    def coarse(self, cells: np.ndarray, group: np.ndarray, known: Rows) -> Rows | None:
+        """What groups of sources may see, as of `left_by_groups`; None from an engine that has no such thing."""
+
     def unknown(self, block: np.ndarray) -> Part:
         """Rows that claim nothing: everything stays potential."""
 

@@ -62,6 +62,9 @@ class GraphEngine:
         """As of `Engine`: there are no objects."""
         return NO_OBJECTS
 
+    def coarse(self, cells: np.ndarray, group: np.ndarray, known: Rows) -> None:
+        """As of `Engine`: there are no objects."""
+
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""
         return Part(unknown_rows(block, self.model.graph.cell_count), NO_OBJECTS)

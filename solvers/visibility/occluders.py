@@ -127,6 +127,42 @@ def seen_objects(
     return refine_objects(model, _hide_in_frames(model, rows), aim_rounds, ledger)
 
 
+def left_by_groups(model: OccluderModel, cells: np.ndarray, group: np.ndarray, known: Rows) -> Rows:
+    """Every object that occluders do not hide from the whole box around each group of view cells, at once.
+
+    One proof serves a group of view cells and, where it can, a node of the hierarchy of objects; nothing is shot at.
+    What is hidden from a group is hidden from each of its cells, exactly; what is not may be.
+
+    Args:
+        model: occluders and occludees.
+        cells: view cells, shape (n,), int.
+        group: of each, from 0 up, none empty, shape (n,), int.
+        known: pairs of them that are seen, which nothing can hide; ordered.
+
+    Returns:
+        Pairs of every cell and what its group may see, without witnesses, ordered.
+    """
+    count, order = int(group.max(initial=-1)) + 1, np.argsort(group, kind="stable")
+    starts = np.searchsorted(group[order], np.arange(count + 1))
+    boxes = model.cells[cells[order]]
+    boxes = np.stack(
+        [np.minimum.reduceat(boxes[:, 0], starts[:-1]), np.maximum.reduceat(boxes[:, 1], starts[:-1])], axis=1
+    )
+    around, occludees = model.from_cells(boxes), model.occludees
+    hide, clear = partial(_hide_nodes, around, None), partial(_clear, around, NO_PLANS)
+    found = descend(boxes, np.arange(count), occludees.levels, occludees.objects, FIRST_LEVEL, hide, clear)
+    rows = Rows.unseen(*found).order()
+    group_of = np.full(len(model.cells), -1)
+    group_of[cells] = group
+    rows.adopt(known.relabelled(group_of).order())
+    potential = rows.seen
+    potential[_prove_pieces(around, rows, None)[0]] = True
+    rows = rows.take(potential)
+    sizes = np.diff(starts)[rows.source]
+    members = order[places_of(starts[rows.source], sizes)]
+    return Rows.unseen(cells[members], np.repeat(rows.target, sizes)).order()
+
+
 def refine_objects(
     model: OccluderModel, rows: Rows, aim_rounds: tuple[int, ...] = AIM_ROUNDS, ledger: Ledger | None = None
 ) -> tuple[Rows, Proofs | None]:

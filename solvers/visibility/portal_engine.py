@@ -26,7 +26,7 @@ from .engine import Part, join_objects, unknown_rows
 from .glance import glance
 from .ledger import Ledger
 from .objects import object_rows
-from .occluders import OccluderModel, hidden_boxes, refine_objects, seen_objects
+from .occluders import OccluderModel, hidden_boxes, left_by_groups, refine_objects, seen_objects
 from .shared import share_sightlines
 
 # With "auto" the occluders are asked about cells of whose potential objects more than this share is unknown.
@@ -139,6 +139,11 @@ class PortalEngine:
     def glance(self, block: np.ndarray, number: int) -> Rows:
         """As of `Engine`."""
         return glance(self._sights, block, number)
+
+    def coarse(self, cells: np.ndarray, group: np.ndarray, known: Rows) -> Rows | None:
+        """As of `Engine`; certificates speak of single cells, and portals alone hide by nothing else."""
+        alone = self._certify or self._least_unknown == np.inf
+        return None if alone else left_by_groups(self.occluders, cells, group, known)
 
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""

@@ -18,7 +18,7 @@ from .aim import AIM_ROUNDS, Sights
 from .engine import Part, join_objects, unknown_rows
 from .glance import glance
 from .ledger import Ledger
-from .occluders import OccluderModel, look_at_objects, seen_objects
+from .occluders import OccluderModel, left_by_groups, look_at_objects, seen_objects
 from .projection import VlodSettings, vlod_hidden
 from .shared import share_sightlines
 
@@ -97,6 +97,11 @@ class ViewCellEngine:
     def glance(self, block: np.ndarray, number: int) -> Rows:
         """As of `Engine`."""
         return glance(self.model.sights, block, number)
+
+    def coarse(self, cells: np.ndarray, group: np.ndarray, known: Rows) -> Rows | None:
+        """As of `Engine`; certificates speak of single cells, and vLOD's method hides by nothing else."""
+        whole = self._certify or self._vlod is not None
+        return None if whole else left_by_groups(self.model, cells, group, known)
 
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""

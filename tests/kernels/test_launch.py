@@ -1,6 +1,7 @@
 """What all launchers share: coordinates beyond the grid are refused, and every item is done once."""
 
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -125,14 +126,14 @@ def test_phases_of_work_side_by_side_are_within_those_of_the_caller():
 
 
 def test_when_one_fails_the_others_end_with_what_they_launch_next():
-    started, ended = threading.Event(), []
+    started, ended, until = threading.Event(), [], time.monotonic() + 20.0
 
     def endless(piece):
         if piece == 0:
             started.wait(10)
             raise ValueError("the first")
         try:
-            while True:
+            while time.monotonic() < until:
                 started.set()
                 run_sliced(lambda first, last: None, 1, wp.get_module("viewcell.kernels.launch"), CPU)
         except KeyboardInterrupt:

@@ -2,7 +2,7 @@
 
 import hashlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -11,7 +11,6 @@ import numpy as np
 
 from ...data.errors import InputError
 from ...data.progress import Phase
-from ...data.rows import Rows
 from ...data.store.blocks import read_block, write_block
 from ...data.view_cells import as_graph, octants, walkable
 from .cells import Sources
@@ -21,11 +20,8 @@ if TYPE_CHECKING:
     from ...kernels.launch import Device
     from ...solvers.visibility.engine import Engine, Part
 
-Item = TypeVar("Item")
+Item, Answer = TypeVar("Item"), TypeVar("Answer")
 
-# Looks around from every view cell before anything else under a budget: share of the time at most, number at most, and
-# the share by which a look has to add to what is seen for there to be another.
-GLANCE, GLANCES, GLANCE_LEAST = 0.05, 16, 0.02
 # How the name of a folder of unfinished work ends.
 PARTIAL = ".partial"
 # Sources per block, which an interrupted bake resumes from.
@@ -34,8 +30,6 @@ BLOCK = 24
 VIEW_BLOCK = 8
 # Threads take blocks: a model of few sources is cut into so many, of no fewer sources than this.
 BLOCKS, LEAST_BLOCK = 4, 3
-# Looking for witnesses takes so many times as long as telling what is hidden, where it was not measured.
-GUESSED = 2.0
 
 
 def partial_folder(out: Path, known: str) -> Path:
@@ -136,81 +130,21 @@ class Work:
 
     def finish_all(self, named: "list[tuple[int | str, np.ndarray]]") -> "list[Part]":
         """Blocks as far as they go, side by side; counts their cells."""
-        return self._each(self.finish, named, [len(block) for _, block in named])
+        return self.each(self.finish, named, [len(block) for _, block in named])
 
-    def _each(self, do: "Callable[[Item], Part]", work: "list[Item]", cells: list[int]) -> "list[Part]":
+    def each(self, do: "Callable[[Item], Answer]", work: "Sequence[Item]", cells: list[int]) -> "list[Answer]":
         """What `do` returns for each piece of work, side by side, in order; counts so many cells for each."""
         from ...kernels.launch import side_by_side
 
-        parts = {}
-        for place, part in side_by_side(do, work, self.device):
-            parts[place] = part
+        found = {}
+        for place, answer in side_by_side(do, work, self.device):
+            found[place] = answer
             self.bar.update(cells[place])
-        return [parts[place] for place in range(len(work))]
-
-    def all_parts(self, blocks: list[np.ndarray]) -> "tuple[list[Part], Shortfall | None]":
-        """All blocks, and what the deadline left of them, if it ended them early: that is unknown, never hidden."""
-        if np.isinf(self.deadline):
-            return self.finish_all(list(enumerate(blocks))), None
-        # First what is seen at a glance, then what is hidden from each, then witnesses where most is unknown.
-        glances, stored = self._glance(blocks), {}
-        for number, block in enumerate(blocks):
-            part = self.store.load(number)
-            if part is not None:
-                stored[number] = part
-                self.bar.update(len(block))
-        raw, hidden, first = [number for number in range(len(blocks)) if number not in stored], {}, _Rate()
-        while raw and first.fits(_cells(blocks, now := raw[: self.width]), self.deadline):
-            del raw[: self.width]
-            hidden |= zip(now, self._timed(first, self.hide, [blocks[number] for number in now]), strict=True)
-        # As much of the others as there is time for.
-        left = np.concatenate([np.zeros(0, int), *(blocks[number] for number in raw)])
-        some = left[: first.room(self.deadline)]
-        rest = self._timed(first, self.hide, [some[k :: self.width] for k in range(self.width) if k < len(some)])
-        for number in raw:
-            hidden[number] = self.engine.unknown(np.setdiff1d(blocks[number], some))
-        rough = sorted(set(hidden) - set(raw), key=lambda number: (-hidden[number].unknown_count, number))
-        # Witnesses take as long again where none were looked for yet, or several times so.
-        full = _Rate(guess=GUESSED * first.each)
-        while rough and full.fits(_cells(blocks, now := rough[: self.width]), self.deadline):
-            del rough[: self.width]
-            named = [(number, blocks[number]) for number in now]
-            hidden |= zip(now, full.take(_cells(blocks, now), lambda named=named: self.finish_all(named)), strict=True)
-        parts = [(stored | hidden)[number] for number in range(len(blocks))]
-        for part in parts:
-            part.objects.adopt(glances)
-        left = raw + rough
-        if not left:
-            return parts, None
-        needed = None
-        if first.cells:
-            needed = time.perf_counter() - self.started
-            needed += _cells(blocks, raw) * first.each + _cells(blocks, left) * full.each
-        pairs = sum(part.unknown_count for part in [*(parts[number] for number in left), *rest])
-        short = Shortfall("hiding" if raw else "witnesses", _cells(blocks, left), pairs, needed)
-        return parts + rest, short
-
-    def _timed(self, rate: "_Rate", do: "Callable[[np.ndarray], Part]", work: list[np.ndarray]) -> "list[Part]":
-        """As `_each`, of blocks whose cells are not done by it; timed."""
-        none = [0] * len(work)
-        return rate.take(sum(map(len, work)), lambda: self._each(do, work, none))
-
-    def _glance(self, blocks: list[np.ndarray]) -> Rows:
-        """Objects seen from the cells of all blocks in a few looks around, while a look shows enough more; ordered."""
-        found, until = [], time.perf_counter() + GLANCE * (self.deadline - time.perf_counter())
-        for number in range(GLANCES):
-            before, fresh = sum(map(len, found)), []
-            for block in blocks:
-                if time.perf_counter() <= until:
-                    fresh.append(self.engine.glance(block, number))
-            found = [Rows.join([*found, *fresh]).order().once()]
-            if len(found[0]) - before <= GLANCE_LEAST * before:
-                break
-        return found[0]
+        return [found[place] for place in range(len(work))]
 
 
 @dataclass
-class _Rate:
+class Rate:
     """How long view cells take: how many were done, in how many seconds; and a guess where none was."""
 
     cells: int = 0
@@ -230,18 +164,13 @@ class _Rate:
         """View cells that are done by a deadline; none where nothing is known."""
         return max(0, int((deadline - time.perf_counter()) / self.each)) if self.each else 0
 
-    def take(self, cells: int, do: "Callable[[], list[Part]]") -> "list[Part]":
+    def take(self, cells: int, do: "Callable[[], Answer]") -> "Answer":
         """What `do` returns, timed."""
         start = time.perf_counter()
-        parts = do()
+        found = do()
         self.cells += cells
         self.seconds += time.perf_counter() - start
-        return parts
-
-
-def _cells(blocks: list[np.ndarray], numbers: list[int]) -> int:
-    """View cells of some blocks."""
-    return sum(len(blocks[number]) for number in numbers)
+        return found
 
 
 def in_blocks(sources: Sources) -> list[np.ndarray]:
@@ -276,7 +205,7 @@ def refine(
         alive = walkable(families.reshape(-1, 2, 3), model).reshape(-1, 8)
         parents = np.flatnonzero(coarse)
         work.engine = engine.from_cells(families[alive].astype(np.int32))
-        fresh, count, rate = [], 0, _Rate()
+        fresh, count, rate = [], 0, Rate()
         work.bar.grow(int(alive.sum()))
         for begin in range(0, len(parents), work.width):
             sizes_now = alive[begin : begin + work.width].sum(axis=1)
@@ -304,7 +233,7 @@ def refine(
     return kept, short
 
 
-def _unrefined(work: Work, parts: "list[Part]", parents: np.ndarray, rate: _Rate) -> Shortfall:
+def _unrefined(work: Work, parts: "list[Part]", parents: np.ndarray, rate: Rate) -> Shortfall:
     """What is left of a level, from the cells that should have been refined and the rate of those that were."""
     pairs = sum(int((~part.objects.seen & np.isin(part.objects.source, parents)).sum()) for part in parts)
     needed = time.perf_counter() - work.started + len(parents) * rate.each if rate.cells else None

@@ -11,6 +11,7 @@ import pyarrow as pa
 
 from ...data.errors import InputError
 from ...data.graph import CellGraph
+from ...data.kept import cell_volumes
 from ...data.lod import object_errors, split_components
 from ...data.prepared import PreparedModel
 from ...data.progress import shown
@@ -25,6 +26,7 @@ from ...solvers.levels.pixel_error import pixel_levels
 from ..baked import Bake
 from . import blocks
 from .blocks import Shortfall, Store, Work, in_blocks, partial_folder, refine
+from .budget import within_budget
 from .cells import Sources, bare_sources, model_sources
 from .manifest import Clock, bake_manifest, fingerprint, rewrite_manifest
 from .place import alone, check_place, occupied, set_aside
@@ -290,7 +292,10 @@ def _visibility(
     bar = clock.show("visibility", sum(map(len, cut)), "cell")
     deadline = np.inf if run.budget_s is None else started + run.budget_s
     work = Work(engine, run.device, Store(partial_folder(run.out, run.known)), bar, deadline, started)
-    parts, short = work.all_parts(cut)
+    if run.budget_s is None:
+        parts, short = work.finish_all(list(enumerate(cut))), None
+    else:
+        parts, short = within_budget(work, cut, sources.graph.cells, cell_volumes(sources.graph))
     if sources.octree:
         parts, unrefined = refine(sources, work, parts, settings)
         short = short or unrefined

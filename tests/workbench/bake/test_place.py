@@ -149,13 +149,13 @@ def test_only_a_bake_that_resumes_says_so(kept, tmp_path, monkeypatch, capsys):
     other = tmp_path / ".a.bake.0123456789abcdef.partial"
     other.mkdir()
     (other / "0.arrow").write_bytes(b"")
-    whole = blocks.Work.all_parts
+    whole = blocks.Work.finish_all
 
     def interrupt(self, cut):
         if kept:
             whole(self, cut)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(blocks.Work, "all_parts", interrupt)
+    monkeypatch.setattr(blocks.Work, "finish_all", interrupt)
     assert main(["bake", "a.scene"]) == 130
     assert ("the same command goes on from there" in capsys.readouterr().err) == kept

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 import viewcell
 from builders import corridors, random_solids
+from builders.clocks import Clock
 from builders.random_buildings import box_triangles as box
 from builders.random_buildings import scene_of
 from viewcell.data.scene import Role, Space
 from viewcell.data.view_cells import as_graph
-from viewcell.solvers.visibility.portal_engine import PortalEngine
 from viewcell.solvers.visibility.view_cell_engine import ViewCellEngine
-from viewcell.workbench.bake import blocks, run
 from viewcell.workbench.bake import worth as told
 from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.bake.worth import told_worth, worth
@@ -91,26 +90,6 @@ def test_a_budget_that_ends_in_the_middle_advises_one_that_is_enough(office, tmp
     advised = float(facts["warnings"][-1].partition("--budget ")[2].partition(" ")[0])
     assert 3.0 * count < advised < 4.0 * count
     assert viewcell.bake(office, tmp_path / "c", threads=1, budget_s=advised).manifest["budget_spent"] is False
-
-
-class Clock:
-    """Time that passes only while blocks are computed: so many seconds each without and with aiming."""
-
-    def __init__(self, monkeypatch, seconds, engine=PortalEngine):
-        self.now, self.calls = 0.0, []
-        visible = engine.visible
-
-        def timed(one, block, *, aim=True):
-            self.now += seconds[aim]
-            self.calls.append(aim)
-            return visible(one, block, aim=aim)
-
-        stopped = type("stopped", (), {"perf_counter": lambda: self.now})
-        monkeypatch.setattr(engine, "visible", timed)
-        monkeypatch.setattr(blocks, "BLOCK", 1)
-        monkeypatch.setattr(blocks, "VIEW_BLOCK", 1)
-        monkeypatch.setattr(blocks, "time", stopped)
-        monkeypatch.setattr(run, "time", stopped)
 
 
 def test_an_octree_that_is_not_refined_is_told(office, tmp_path, monkeypatch):

@@ -1,0 +1,25 @@
+"""Time that passes only where a test wants it to."""
+
+from viewcell.solvers.visibility.portal_engine import PortalEngine
+from viewcell.workbench.bake import blocks, budget, run
+
+
+class Clock:
+    """Time that passes only while blocks are computed: so many seconds each without and with aiming."""
+
+    def __init__(self, monkeypatch, seconds, engine=PortalEngine):
+        self.now, self.calls = 0.0, []
+        visible = engine.visible
+
+        def timed(one, block, *, aim=True):
+            self.now += seconds[aim]
+            self.calls.append(aim)
+            return visible(one, block, aim=aim)
+
+        stopped = type("stopped", (), {"perf_counter": lambda: self.now})
+        monkeypatch.setattr(engine, "visible", timed)
+        monkeypatch.setattr(blocks, "BLOCK", 1)
+        monkeypatch.setattr(blocks, "VIEW_BLOCK", 1)
+        monkeypatch.setattr(blocks, "time", stopped)
+        monkeypatch.setattr(budget, "time", stopped)
+        monkeypatch.setattr(run, "time", stopped)

@@ -1,0 +1,206 @@
+"""A bake within a budget: something sound for every view cell first, then what tells most per second.
+
+First what is seen at a glance; then what is hidden, from one block of view cells as a bake does it. Where there is no
+time to do so from all: what occluders hide from groups of neighbouring view cells, one proof for all of a group, then
+from single view cells, those first that keep most. What time is left hides as a bake does, then finds witnesses.
+Everything that is not proved hidden by then is kept, and is unknown where it was not seen.
+"""
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...data.hierarchy import median_order
+from ...data.rows import Rows
+from .blocks import Rate, Shortfall, Work
+
+if TYPE_CHECKING:
+    from ...solvers.visibility.engine import Part
+
+# Looks around from every view cell before anything else: share of the time at most, number at most, and the share by
+# which a look has to add to what is seen for there to be another.
+GLANCE, GLANCES, GLANCE_LEAST = 0.05, 16, 0.02
+# View cells in the smallest groups; share of the time that groups may take; groups, then view cells, done at a time.
+GROUP, GROUPS_SHARE, TOGETHER = 8, 0.3, 8
+# Looking for witnesses takes so many times as long as telling what is hidden, where it was not measured.
+GUESSED = 2.0
+# View cells of the first blocks that tell how long others take.
+PROBE = 4
+
+
+def within_budget(
+    work: Work, blocks: list[np.ndarray], boxes: np.ndarray, volumes: np.ndarray
+) -> "tuple[list[Part], Shortfall | None]":
+    """All blocks, and what the deadline left of them, if it ended them early: that is unknown, never hidden.
+
+    Args:
+        work: on its way.
+        blocks: view cells.
+        boxes: of all cells [grid steps], shape (cells, 2, 3), int32.
+        volumes: of all cells, shape (cells,), float64.
+    """
+    glances, done = _glance(work, blocks), {}
+    for number, block in enumerate(blocks):
+        part = work.store.load(number)
+        if part is not None:
+            done[number] = [part]
+            work.bar.update(len(block))
+    stored, hiding = set(done), Rate()
+    left = _pieces([(number, block) for number, block in enumerate(blocks) if number not in stored], work.width)
+    coarse = _Coarse(work, glances, np.concatenate([np.zeros(0, int), *(cells for _, cells in left)]), boxes, volumes)
+    while left and hiding.fits(_cells(now := left[: work.width]), work.deadline):
+        del left[: work.width]
+        for (number, _), part in zip(now, _hide(work, hiding, [cells for _, cells in now]), strict=True):
+            done.setdefault(number, []).append(part)
+        if not hiding.fits(_cells(left), work.deadline):
+            coarse.run()
+    # As much of the others as there is time for.
+    cells = np.concatenate([np.zeros(0, int), *(cells for _, cells in left)])
+    some = cells[: hiding.room(work.deadline)]
+    rest = _hide(work, hiding, [some[k :: work.width] for k in range(min(work.width, len(some)))])
+    for number, cells in left:
+        part = work.engine.unknown(np.setdiff1d(cells, some))
+        part.objects = coarse.left(part.objects)
+        done.setdefault(number, []).append(part)
+    raw = {number for number, _ in left}
+    rough = sorted(set(done) - stored - raw, key=lambda number: (-_unknown(done[number]), number))
+    # Witnesses take as long again where none were looked for yet, or several times so.
+    full = Rate(guess=GUESSED * hiding.each)
+    while rough and full.fits(_cells(now := [(k, blocks[k]) for k in rough[: work.width]]), work.deadline):
+        del rough[: work.width]
+        for (number, _), part in zip(now, full.take(_cells(now), lambda now=now: work.finish_all(now)), strict=True):
+            done[number] = [part]
+    parts = [part for number in range(len(blocks)) for part in done[number]] + rest
+    for part in parts:
+        part.objects.adopt(glances)
+    unfinished = [*raw, *rough]
+    if not unfinished:
+        return parts, None
+    count, needed = sum(len(blocks[number]) for number in unfinished), None
+    if hiding.cells:
+        needed = time.perf_counter() - work.started + _cells(left) * hiding.each + count * full.each
+    pairs = sum(_unknown(done[number]) for number in unfinished) + _unknown(rest)
+    return parts, Shortfall("hiding" if raw else "witnesses", count, pairs, needed)
+
+
+def _pieces(named: list[tuple[int, np.ndarray]], width: int) -> list[tuple[int, np.ndarray]]:
+    """The blocks, the first few of them in two: a small piece soon tells how long all take."""
+    first = [(number, block[:PROBE]) for number, block in named[:width]]
+    second = [(number, block[PROBE:]) for number, block in named[:width] if len(block) > PROBE]
+    return first + second + named[width:]
+
+
+def _unknown(parts: "list[Part]") -> int:
+    """Pairs without a witness."""
+    return sum(part.unknown_count for part in parts)
+
+
+def _hide(work: Work, rate: Rate, blocks: list[np.ndarray]) -> "list[Part]":
+    """What is hidden from some blocks; timed, and not counted as done."""
+    return rate.take(sum(map(len, blocks)), lambda: work.each(work.hide, blocks, [0] * len(blocks)))
+
+
+def _cells(pieces: list[tuple[int, np.ndarray]]) -> int:
+    """View cells of some pieces of blocks."""
+    return sum(len(cells) for _, cells in pieces)
+
+
+def _glance(work: Work, blocks: list[np.ndarray]) -> Rows:
+    """Objects seen from the cells of all blocks in a few looks around, while a look shows enough more; ordered."""
+    found, until = Rows.join([]), time.perf_counter() + GLANCE * (work.deadline - time.perf_counter())
+    for number in range(GLANCES):
+        fresh, left = [], blocks
+        while left and time.perf_counter() <= until:
+            now, left = left[: work.width], left[work.width :]
+            fresh += work.each(lambda block, number=number: work.engine.glance(block, number), now, [0] * len(now))
+        before, found = len(found), Rows.join([found, *fresh]).order().once()
+        if left or len(found) - before <= GLANCE_LEAST * before:
+            break
+    return found
+
+
+@dataclass
+class _Coarse:
+    """What some view cells may see by occluders alone, from coarse groups to single ones; at first everything.
+
+    Attributes:
+        work: on its way.
+        glances: pairs known to be seen.
+        cells: view cells, shape (n,), int.
+        boxes: of all cells.
+        volumes: likewise.
+        kept: whether cells[i] may see object j, shape (n, objects), bool; None before `run`.
+    """
+
+    work: Work
+    glances: Rows
+    cells: np.ndarray
+    boxes: np.ndarray
+    volumes: np.ndarray
+    kept: np.ndarray | None = None
+
+    def run(self) -> None:
+        """Hide as much as there is time for, once."""
+        if self.kept is not None:
+            return
+        self.kept = np.ones((len(self.cells), len(self.work.engine.unknown(self.cells[:1]).objects)), bool)
+        if not self.kept.size or self._ask(np.arange(len(self.cells)), np.zeros(1, int)) is None:
+            return
+        self._hide(*self._groups(), self.volumes[self.cells])
+        self._hide(np.arange(len(self.cells)), Rate(), self.kept.sum(axis=1) * self.volumes[self.cells])
+
+    def left(self, rows: Rows) -> Rows:
+        """Those of some rows that are not hidden."""
+        if self.kept is None:
+            return rows
+        place = np.full(len(self.boxes), -1)
+        place[self.cells] = np.arange(len(self.cells))
+        return rows.take(self.kept[place[rows.source], rows.target])
+
+    def _groups(self) -> tuple[np.ndarray, Rate]:
+        """Group of each cell, of as many groups as there is time for, from what a few of the smallest take."""
+        depth = max(0, int(np.ceil(np.log2(len(self.cells) / GROUP))))
+        group, rate = self._cut(depth), Rate()
+        few = np.arange(int(group.max()) + 1)[:: max(1, 2**depth // (2 * self.work.width))]
+        rate.take(len(few), lambda: self._ask(group, few))
+        share = GROUPS_SHARE * (self.work.deadline - time.perf_counter())
+        more = 2**depth * rate.each / max(share, 1e-9)
+        return (group if more <= 1.0 else self._cut(max(0, depth - int(np.ceil(np.log2(more))))), rate)
+
+    def _cut(self, depth: int) -> np.ndarray:
+        """Group of each cell, of neighbours, halved so many times; shape (n,), int."""
+        leaves = np.arange(len(self.cells)) * 2**depth // len(self.cells)
+        group = np.empty(len(self.cells), int)
+        group[median_order(self.boxes[self.cells].astype(np.int64).sum(axis=1), leaves, depth)] = leaves
+        return np.unique(group, return_inverse=True)[1]
+
+    def _ask(self, group: np.ndarray, some: np.ndarray) -> list[Rows] | None:
+        """What some groups of the cells may see, side by side; None from an engine that cannot tell."""
+
+        def ask(mine: np.ndarray) -> Rows | None:
+            rows = np.flatnonzero(np.isin(group, mine))
+            own = np.unique(group[rows], return_inverse=True)[1]
+            return self.work.engine.coarse(self.cells[rows], own, self.glances)
+
+        shares = [some[k :: self.work.width] for k in range(min(self.work.width, len(some)))]
+        found = self.work.each(ask, shares, [0] * len(shares))
+        return None if found[0] is None else found
+
+    def _hide(self, group: np.ndarray, rate: Rate, worth: np.ndarray) -> None:
+        """Hide from groups of cells, those first that are worth most, while there is time."""
+        place = np.full(len(self.boxes), -1)
+        place[self.cells] = np.arange(len(self.cells))
+        order = np.argsort(-np.bincount(group, worth), kind="stable")
+        step = TOGETHER * self.work.width
+        for begin in range(0, len(order), step):
+            some = order[begin : begin + step]
+            if not rate.fits(len(some), self.work.deadline):
+                return
+            found = Rows.join(rate.take(len(some), lambda some=some: self._ask(group, some)))
+            mine = np.flatnonzero(np.isin(group, some))
+            left = np.zeros((len(mine), self.kept.shape[1]), bool)
+            left[np.searchsorted(mine, place[found.source]), found.target] = True
+            self.kept[mine] &= left
+            self.work.bar.note = f"{self.kept.mean():.0%} of the objects kept"
