@@ -8,7 +8,7 @@ class Clock:
     """Time that passes only while blocks are computed: so many seconds each without and with aiming."""
 
     def __init__(self, monkeypatch, seconds, engine=PortalEngine):
-        self.now, self.calls = 0.0, []
+        self.now, self.calls, self.seconds = 0.0, [], seconds
         visible = engine.visible
 
         def timed(one, block, *, aim=True):

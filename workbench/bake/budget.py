@@ -8,6 +8,7 @@ Everything that is not proved hidden by then is kept, and is unknown where it wa
 
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,8 +23,9 @@ if TYPE_CHECKING:
 # Looks around from every view cell before anything else: share of the time at most, number at most, and the share by
 # which a look has to add to what is seen for there to be another.
 GLANCE, GLANCES, GLANCE_LEAST = 0.05, 16, 0.02
-# View cells in the smallest groups; share of the time that groups may take; groups, then view cells, done at a time.
-GROUP, GROUPS_SHARE, TOGETHER = 8, 0.3, 8
+# View cells in the smallest groups; share of the time that groups may take; groups done at a time by a thread; and how
+# many times faster per cell than hiding as a bake does it has to be: walls alone are slow inside buildings.
+GROUP, GROUPS_SHARE, TOGETHER, FASTER = 8, 0.3, 8, 2.0
 # Looking for witnesses takes so many times as long as telling what is hidden, where it was not measured.
 GUESSED = 2.0
 # View cells of the first blocks that tell how long others take.
@@ -50,12 +52,14 @@ def within_budget(
     stored, hiding = set(done), Rate()
     left = _pieces([(number, block) for number, block in enumerate(blocks) if number not in stored], work.width)
     coarse = _Coarse(work, glances, np.concatenate([np.zeros(0, int), *(cells for _, cells in left)]), boxes, volumes)
+    if left and hiding.fits(1, work.deadline):
+        coarse.begin()
     while left and hiding.fits(_cells(now := left[: work.width]), work.deadline):
         del left[: work.width]
         for (number, _), part in zip(now, _hide(work, hiding, [cells for _, cells in now]), strict=True):
             done.setdefault(number, []).append(part)
         if not hiding.fits(_cells(left), work.deadline):
-            coarse.run()
+            coarse.run(hiding)
     # As much of the others as there is time for.
     cells = np.concatenate([np.zeros(0, int), *(cells for _, cells in left)])
     some = cells[: hiding.room(work.deadline)]
@@ -131,6 +135,7 @@ class _Coarse:
         cells: view cells, shape (n,), int.
         boxes: of all cells.
         volumes: likewise.
+        able: whether the engine can tell.
         kept: whether cells[i] may see object j, shape (n, objects), bool; None before `run`.
     """
 
@@ -139,35 +144,49 @@ class _Coarse:
     cells: np.ndarray
     boxes: np.ndarray
     volumes: np.ndarray
+    able: bool = False
     kept: np.ndarray | None = None
 
-    def run(self) -> None:
-        """Hide as much as there is time for, once."""
-        if self.kept is not None:
+    def begin(self) -> None:
+        """Ask about one cell: that makes what all others, and hiding as a bake does, use as well."""
+        self.able = self.work.engine.coarse(self.cells[:1], np.zeros(1, int), self.glances) is not None
+
+    def run(self, hiding: Rate) -> None:
+        """Hide as much as there is time for, once, where that is so many times faster than hiding as a bake does."""
+        if self.kept is not None or not self.able:
             return
         self.kept = np.ones((len(self.cells), len(self.work.engine.unknown(self.cells[:1]).objects)), bool)
-        if not self.kept.size or self._ask(np.arange(len(self.cells)), np.zeros(1, int)) is None:
-            return
-        self._hide(*self._groups(), self.volumes[self.cells])
-        self._hide(np.arange(len(self.cells)), Rate(), self.kept.sum(axis=1) * self.volumes[self.cells])
+        depth = max(0, int(np.ceil(np.log2(len(self.cells) / GROUP))))
+        group, rate = self._cut(depth), self._timed(depth)
+        if rate.each * 2**depth < hiding.each * len(self.cells) / FASTER:
+            share = GROUPS_SHARE * (self.work.deadline - time.perf_counter())
+            more = 2**depth * rate.each / max(share, 1e-9)
+            if more > 1.0:
+                group = self._cut(max(0, depth - int(np.ceil(np.log2(more)))))
+            self._hide(group, rate, self.volumes[self.cells])
+        rate = self._timed(int(np.log2(len(self.cells))))
+        if rate.each < hiding.each / FASTER:
+            self._hide(np.arange(len(self.cells)), rate, self.kept.sum(axis=1) * self.volumes[self.cells])
 
     def left(self, rows: Rows) -> Rows:
         """Those of some rows that are not hidden."""
         if self.kept is None:
             return rows
-        place = np.full(len(self.boxes), -1)
-        place[self.cells] = np.arange(len(self.cells))
-        return rows.take(self.kept[place[rows.source], rows.target])
+        return rows.take(self.kept[self._places[rows.source], rows.target])
 
-    def _groups(self) -> tuple[np.ndarray, Rate]:
-        """Group of each cell, of as many groups as there is time for, from what a few of the smallest take."""
-        depth = max(0, int(np.ceil(np.log2(len(self.cells) / GROUP))))
+    @cached_property
+    def _places(self) -> np.ndarray:
+        """Place of each of all cells among these."""
+        places = np.full(len(self.boxes), -1)
+        places[self.cells] = np.arange(len(self.cells))
+        return places
+
+    def _timed(self, depth: int) -> Rate:
+        """What a few groups take of cells that are halved so many times."""
         group, rate = self._cut(depth), Rate()
-        few = np.arange(int(group.max()) + 1)[:: max(1, 2**depth // (2 * self.work.width))]
+        few = np.arange(int(group.max()) + 1)[:: max(1, 2**depth // self.work.width)]
         rate.take(len(few), lambda: self._ask(group, few))
-        share = GROUPS_SHARE * (self.work.deadline - time.perf_counter())
-        more = 2**depth * rate.each / max(share, 1e-9)
-        return (group if more <= 1.0 else self._cut(max(0, depth - int(np.ceil(np.log2(more))))), rate)
+        return rate
 
     def _cut(self, depth: int) -> np.ndarray:
         """Group of each cell, of neighbours, halved so many times; shape (n,), int."""
@@ -176,22 +195,19 @@ class _Coarse:
         group[median_order(self.boxes[self.cells].astype(np.int64).sum(axis=1), leaves, depth)] = leaves
         return np.unique(group, return_inverse=True)[1]
 
-    def _ask(self, group: np.ndarray, some: np.ndarray) -> list[Rows] | None:
-        """What some groups of the cells may see, side by side; None from an engine that cannot tell."""
+    def _ask(self, group: np.ndarray, some: np.ndarray) -> list[Rows]:
+        """What some groups of the cells may see, side by side."""
 
-        def ask(mine: np.ndarray) -> Rows | None:
+        def ask(mine: np.ndarray) -> Rows:
             rows = np.flatnonzero(np.isin(group, mine))
             own = np.unique(group[rows], return_inverse=True)[1]
             return self.work.engine.coarse(self.cells[rows], own, self.glances)
 
         shares = [some[k :: self.work.width] for k in range(min(self.work.width, len(some)))]
-        found = self.work.each(ask, shares, [0] * len(shares))
-        return None if found[0] is None else found
+        return self.work.each(ask, shares, [0] * len(shares))
 
     def _hide(self, group: np.ndarray, rate: Rate, worth: np.ndarray) -> None:
         """Hide from groups of cells, those first that are worth most, while there is time."""
-        place = np.full(len(self.boxes), -1)
-        place[self.cells] = np.arange(len(self.cells))
         order = np.argsort(-np.bincount(group, worth), kind="stable")
         step = TOGETHER * self.work.width
         for begin in range(0, len(order), step):
@@ -201,6 +217,6 @@ class _Coarse:
             found = Rows.join(rate.take(len(some), lambda some=some: self._ask(group, some)))
             mine = np.flatnonzero(np.isin(group, some))
             left = np.zeros((len(mine), self.kept.shape[1]), bool)
-            left[np.searchsorted(mine, place[found.source]), found.target] = True
+            left[np.searchsorted(mine, self._places[found.source]), found.target] = True
             self.kept[mine] &= left
             self.work.bar.note = f"{self.kept.mean():.0%} of the objects kept"

@@ -63,6 +63,23 @@ def test_groups_alone_hide_something(office, whole, tmp_path, slow, monkeypatch)
     assert kept(whole).sum() < kept(made).sum() < kept(made).size
 
 
+def test_occluders_are_not_asked_where_they_are_slow(office, tmp_path, slow, monkeypatch):
+    """An ask takes longer than hiding from a cell, whether of a group or of a cell: a few are tried, and no more."""
+    asked, coarse = [], PortalEngine.coarse
+
+    def timed(engine, cells, group, known):
+        slow.now += 4.0 * len(cells)
+        asked.append(len(cells))
+        return coarse(engine, cells, group, known)
+
+    slow.seconds[False] = 6.0
+    monkeypatch.setattr(PortalEngine, "coarse", timed)
+    monkeypatch.setattr(budget, "GROUP", 3)
+    made = viewcell.bake(office, tmp_path / "a", budget_s=50.0, threads=1)
+    assert len(asked) == 3 and slow.calls.count(False) >= 2
+    assert kept(made).sum(axis=1).max() == kept(made).shape[1]
+
+
 def test_what_engines_cannot_group_is_kept(office, whole, tmp_path, slow):
     """Portals alone say nothing of groups."""
     made = viewcell.bake(office, tmp_path / "a", method="portals", budget_s=100.0, threads=1)
@@ -71,8 +88,10 @@ def test_what_engines_cannot_group_is_kept(office, whole, tmp_path, slow):
 
 
 def test_an_engine_with_time_asks_no_groups(office, tmp_path, monkeypatch):
-    monkeypatch.setattr(PortalEngine, "coarse", None)
+    asked, coarse = [], PortalEngine.coarse
+    monkeypatch.setattr(PortalEngine, "coarse", lambda *a: asked.append(a[1:3]) or coarse(*a))
     assert viewcell.bake(office, tmp_path / "a", budget_s=600.0).manifest["budget_spent"] is False
+    assert [(len(cells), len(group)) for cells, group in asked] == [(1, 1)]
 
 
 def test_the_first_pieces_are_small():
