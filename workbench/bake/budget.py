@@ -28,6 +28,8 @@ GLANCE, GLANCES, GLANCE_LEAST = 0.05, 16, 0.02
 GROUP, GROUPS_SHARE, TOGETHER, FASTER = 8, 0.3, 8, 2.0
 # Looking for witnesses takes so many times as long as telling what is hidden, where it was not measured.
 GUESSED = 2.0
+# Whether there is time for all is measured, if by that guess there is so large a part of it.
+HOPE = 4.0
 # View cells of the first blocks that tell how long others take.
 PROBE = 4
 
@@ -52,14 +54,19 @@ def within_budget(
     stored, hiding = set(done), Rate()
     left = _pieces([(number, block) for number, block in enumerate(blocks) if number not in stored], work.width)
     coarse = _Coarse(work, glances, np.concatenate([np.zeros(0, int), *(cells for _, cells in left)]), boxes, volumes)
+    full, begun = Rate(), 0.0
     if left and hiding.fits(1, work.deadline):
         coarse.begin()
-    while left and hiding.fits(_cells(now := left[: work.width]), work.deadline):
+        begun = time.perf_counter() - work.started
+        left = _finish_directly(work, blocks, left, (hiding, full), done)
+    while left:
+        if not hiding.fits(_cells(left), work.deadline):
+            coarse.run(hiding)
+        if not hiding.fits(_cells(now := left[: work.width]), work.deadline):
+            break
         del left[: work.width]
         for (number, _), part in zip(now, _hide(work, hiding, [cells for _, cells in now]), strict=True):
             done.setdefault(number, []).append(part)
-        if not hiding.fits(_cells(left), work.deadline):
-            coarse.run(hiding)
     # As much of the others as there is time for.
     cells = np.concatenate([np.zeros(0, int), *(cells for _, cells in left)])
     some = cells[: hiding.room(work.deadline)]
@@ -71,11 +78,8 @@ def within_budget(
     raw = {number for number, _ in left}
     rough = sorted(set(done) - stored - raw, key=lambda number: (-_unknown(done[number]), number))
     # Witnesses take as long again where none were looked for yet, or several times so.
-    full = Rate(guess=GUESSED * hiding.each)
-    while rough and full.fits(_cells(now := [(k, blocks[k]) for k in rough[: work.width]]), work.deadline):
-        del rough[: work.width]
-        for (number, _), part in zip(now, full.take(_cells(now), lambda now=now: work.finish_all(now)), strict=True):
-            done[number] = [part]
+    full.guess = GUESSED * hiding.each
+    rough = [number for number, _ in _finish(work, full, [(number, blocks[number]) for number in rough], done)]
     parts = [part for number in range(len(blocks)) for part in done[number]] + rest
     for part in parts:
         part.objects.adopt(glances)
@@ -84,9 +88,54 @@ def within_budget(
         return parts, None
     count, needed = sum(len(blocks[number]) for number in unfinished), None
     if hiding.cells:
-        needed = time.perf_counter() - work.started + _cells(left) * hiding.each + count * full.each
+        # Given that, another bake finishes directly what this one has not.
+        small = PROBE * work.width
+        needed = begun + small * hiding.each + (small + count) * full.each
     pairs = sum(_unknown(done[number]) for number in unfinished) + _unknown(rest)
     return parts, Shortfall("hiding" if raw else "witnesses", count, pairs, needed)
+
+
+def _finish(
+    work: Work, rate: Rate, named: list[tuple[int, np.ndarray]], done: "dict[int, list[Part]]"
+) -> list[tuple[int, np.ndarray]]:
+    """Blocks that there is no time to finish; the others are done then."""
+    while named and rate.fits(_cells(now := named[: work.width]), work.deadline):
+        named = named[work.width :]
+        for (number, _), part in zip(now, rate.take(_cells(now), lambda now=now: work.finish_all(now)), strict=True):
+            done[number] = [part]
+    return named
+
+
+def _finish_directly(
+    work: Work,
+    blocks: list[np.ndarray],
+    left: list[tuple[int, np.ndarray]],
+    rates: tuple[Rate, Rate],
+    done: "dict[int, list[Part]]",
+) -> list[tuple[int, np.ndarray]]:
+    """Where there may be time for everything, finish what can be finished without hiding first, which is done again.
+
+    Args:
+        work: on its way.
+        blocks: view cells.
+        left: pieces of blocks that are not done.
+        rates: of hiding and of finishing, which a small piece of each of the first blocks tells here.
+        done: parts of blocks.
+
+    Returns:
+        Pieces that are left.
+    """
+    hiding, full = rates
+    pieces = [cells for _, cells in left[: work.width]]
+    count, all_cells = sum(map(len, pieces)), _cells(left)
+    _hide(work, hiding, pieces)
+    if not Rate(guess=GUESSED * hiding.each / HOPE).fits(all_cells, work.deadline):
+        return left
+    full.take(count, lambda: work.each(work.engine.visible, pieces, [0] * len(pieces)))
+    if not full.fits(all_cells, work.deadline):
+        return left
+    unfinished = {number for number, _ in _finish(work, full, [(k, blocks[k]) for k in dict(left)], done)}
+    return [(number, cells) for number, cells in left if number in unfinished]
 
 
 def _pieces(named: list[tuple[int, np.ndarray]], width: int) -> list[tuple[int, np.ndarray]]:

@@ -72,7 +72,7 @@ def test_occluders_are_not_asked_where_they_are_slow(office, tmp_path, slow, mon
         asked.append(len(cells))
         return coarse(engine, cells, group, known)
 
-    slow.seconds[False] = 6.0
+    slow.seconds |= {False: 6.0, True: 6.0}
     monkeypatch.setattr(PortalEngine, "coarse", timed)
     monkeypatch.setattr(budget, "GROUP", 3)
     made = viewcell.bake(office, tmp_path / "a", budget_s=50.0, threads=1)

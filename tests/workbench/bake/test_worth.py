@@ -14,6 +14,7 @@ from viewcell.data.scene import Role, Space
 from viewcell.data.view_cells import as_graph
 from viewcell.solvers.visibility.view_cell_engine import ViewCellEngine
 from viewcell.workbench.bake import worth as told
+from viewcell.workbench.bake.budget import PROBE
 from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.bake.worth import told_worth, worth
 from viewcell.workbench.summary import summary
@@ -74,32 +75,35 @@ def test_a_budget_that_ends_early_is_told(office, tmp_path):
 
 
 def test_a_budget_that_ends_in_the_middle_advises_one_that_is_enough(office, tmp_path, monkeypatch):
-    """Every cell takes a second, and with witnesses two more; with witnesses as guessed, and as measured."""
+    """Every cell takes a second, and with witnesses two: as guessed, and as measured of the first."""
     clock = Clock(monkeypatch, {False: 1.0, True: 2.0})
-    facts = viewcell.bake(office, tmp_path / "a", threads=1, budget_s=3.5).manifest
+    facts = viewcell.bake(office, tmp_path / "a", threads=1, budget_s=2.5).manifest
     count = facts["counts"]["inhabitable"]
-    assert clock.calls == [False] * 3
+    needed = 1.0 * PROBE + 2.0 * (PROBE + count)
+    assert clock.calls == [False] * 2
     assert facts["budget"] | {"pairs": 0} == {
-        "budget_s": 3.5, "phase": "hiding", "cells": count, "pairs": 0, "needed_s": 3.0 * count,
+        "budget_s": 2.5, "phase": "hiding", "cells": count, "pairs": 0, "needed_s": needed,
     }  # fmt: skip
-    facts = viewcell.bake(office, tmp_path / "b", threads=1, budget_s=count + 4.5).manifest
-    assert clock.calls[3:] == [False] * count + [True] * 2
-    assert facts["budget"]["phase"] == "witnesses" and facts["budget"]["cells"] == count - 2
-    assert facts["budget"]["needed_s"] == 3.0 * count
+    facts = viewcell.bake(office, tmp_path / "b", threads=1, budget_s=count + 6.5).manifest
+    assert clock.calls[2:] == [False, True] + [False] * count + [True]
+    assert facts["budget"]["phase"] == "witnesses" and facts["budget"]["cells"] == count - 1
+    assert facts["budget"]["needed_s"] == needed - 2.0
     assert 0 < facts["budget"]["pairs"] < facts["counts"]["cell_pairs"] + facts["counts"]["object_pairs"]
     advised = float(facts["warnings"][-1].partition("--budget ")[2].partition(" ")[0])
-    assert 3.0 * count < advised < 4.0 * count
+    assert needed - 2.0 < advised < 1.4 * needed
+    clock.calls.clear()
     assert viewcell.bake(office, tmp_path / "c", threads=1, budget_s=advised).manifest["budget_spent"] is False
+    assert clock.calls == [False, True] + [True] * count
 
 
 def test_an_octree_that_is_not_refined_is_told(office, tmp_path, monkeypatch):
-    """The roots take a second each, and so do the children: time for the roots, their witnesses and two families."""
+    """The roots take a second each, and so do their children: time for two pieces, the roots, and two families."""
     settings = Settings(method="occluders", cell_size_m=8.0, depth=1, refine_triangles=1)
     roots = viewcell.bake(office, tmp_path / "roots", settings=replace(settings, depth=0)).graph.cell_count
     Clock(monkeypatch, {False: 1.0, True: 1.0}, ViewCellEngine)
-    facts = viewcell.bake(office, tmp_path / "tree", settings=settings, threads=1, budget_s=2 * roots + 2.5).manifest
+    facts = viewcell.bake(office, tmp_path / "tree", settings=settings, threads=1, budget_s=roots + 4.5).manifest
     assert facts["budget"] | {"pairs": 0} == {
-        "budget_s": 2 * roots + 2.5, "phase": "octree", "cells": roots - 2, "pairs": 0, "needed_s": 3.0 * roots,
+        "budget_s": roots + 4.5, "phase": "octree", "cells": roots - 2, "pairs": 0, "needed_s": 2.0 * roots + 2.0,
     }  # fmt: skip
     assert facts["budget"]["pairs"] <= facts["counts"]["object_pairs"]
     assert (
