@@ -366,6 +366,9 @@ def test_a_bake_of_view_cells_that_were_changed_is_not_kept(tmp_path):
         ({"settings": Settings(refine_kept=0.5)}, "refine-kept"),
         ({"settings": Settings(refine_kept=2.0, cells="octree")}, "refine-kept"),
         ({"settings": Settings(method="occluders", cells="portals")}, "cells"),
+        # What a scene was not read with, it would do without in silence.
+        ({"doors": "closed"}, "doors"),
+        ({"glass": "curtain"}, "glass"),
     ],
 )
 def test_bad_arguments_are_one_line(options, message, office, tmp_path):
