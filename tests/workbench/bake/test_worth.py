@@ -28,6 +28,11 @@ def office():
     return viewcell.make_office(floors=1, rooms_per_side=2)
 
 
+@pytest.fixture(scope="module")
+def shell():
+    return viewcell.make_office(floors=1, rooms_per_side=2, furnished=False)
+
+
 def over_everything(scene, folder):
     """A table with one view cell over the whole model."""
     low, high = scene.bounds() * scene.grid_m + scene.origin
@@ -74,23 +79,23 @@ def test_a_budget_that_ends_early_is_told(office, tmp_path):
     }  # fmt: skip
 
 
-def test_a_budget_that_ends_in_the_middle_advises_one_that_is_enough(office, tmp_path, monkeypatch):
+def test_a_budget_that_ends_in_the_middle_advises_one_that_is_enough(shell, tmp_path, monkeypatch):
     """Every cell takes a second, and with witnesses two more; with witnesses as guessed, and as measured."""
     clock = Clock(monkeypatch, {False: 1.0, True: 2.0})
-    facts = viewcell.bake(office, tmp_path / "a", budget_s=3.5).manifest
+    facts = viewcell.bake(shell, tmp_path / "a", budget_s=3.5).manifest
     count = facts["counts"]["inhabitable"]
     assert clock.calls == [False] * 3
     assert facts["budget"] | {"pairs": 0} == {
         "budget_s": 3.5, "phase": "hiding", "cells": count, "pairs": 0, "needed_s": 3.0 * count,
     }  # fmt: skip
-    facts = viewcell.bake(office, tmp_path / "b", budget_s=count + 4.5).manifest
+    facts = viewcell.bake(shell, tmp_path / "b", budget_s=count + 4.5).manifest
     assert clock.calls[3:] == [False] * count + [True] * 2
     assert facts["budget"]["phase"] == "witnesses" and facts["budget"]["cells"] == count - 2
     assert facts["budget"]["needed_s"] == 3.0 * count
     assert 0 < facts["budget"]["pairs"] < facts["counts"]["cell_pairs"] + facts["counts"]["object_pairs"]
     advised = float(facts["warnings"][-1].partition("--budget ")[2].partition(" ")[0])
     assert 3.0 * count < advised < 4.0 * count
-    assert viewcell.bake(office, tmp_path / "c", budget_s=advised).manifest["budget_spent"] is False
+    assert viewcell.bake(shell, tmp_path / "c", budget_s=advised).manifest["budget_spent"] is False
 
 
 class Clock:
@@ -113,12 +118,12 @@ class Clock:
         monkeypatch.setattr(run, "time", stopped)
 
 
-def test_an_octree_that_is_not_refined_is_told(office, tmp_path, monkeypatch):
+def test_an_octree_that_is_not_refined_is_told(shell, tmp_path, monkeypatch):
     """The roots take a second each, and so do the children: time for the roots, their witnesses and two families."""
     settings = Settings(method="occluders", cell_size_m=8.0, depth=1, refine_triangles=1)
-    roots = viewcell.bake(office, tmp_path / "roots", settings=replace(settings, depth=0)).graph.cell_count
+    roots = viewcell.bake(shell, tmp_path / "roots", settings=replace(settings, depth=0)).graph.cell_count
     Clock(monkeypatch, {False: 1.0, True: 1.0}, ViewCellEngine)
-    facts = viewcell.bake(office, tmp_path / "tree", settings=settings, budget_s=2 * roots + 2.5).manifest
+    facts = viewcell.bake(shell, tmp_path / "tree", settings=settings, budget_s=2 * roots + 2.5).manifest
     assert facts["budget"] | {"pairs": 0} == {
         "budget_s": 2 * roots + 2.5, "phase": "octree", "cells": roots - 2, "pairs": 0, "needed_s": 3.0 * roots,
     }  # fmt: skip
