@@ -87,6 +87,7 @@ def test_rooms_and_doors_go_before_storeys(tmp_path):
     assert not implausible(replace(scene, source=""))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (SHARED / "scenes").is_dir(), reason="shared scenes are not here")
 @pytest.mark.parametrize("name", ["ifc/kit_edc_sb/KIT-EDC_with_SB.ifc"])
 def test_real_buildings_are_plausible(name):
