@@ -203,6 +203,19 @@ def test_blocks_of_another_size_are_not_taken_for_ours(shell, shell_bake, tmp_pa
     assert same_tables(viewcell.bake(shell, tmp_path / "shell"), shell_bake)
 
 
+def test_blocks_of_other_settings_are_not_taken_for_ours(shell, shell_bake, tmp_path, monkeypatch):
+    """A bake that was stopped does not go on as one of other settings."""
+    monkeypatch.setattr(blocks, "BLOCK", 3)
+    with monkeypatch.context() as patch:
+        stop_after(2, patch)
+        with pytest.raises(Stopped):
+            viewcell.bake(shell, tmp_path / "shell", threads=1)
+    wanted, made = (
+        viewcell.bake(shell, tmp_path / name, settings=Settings(seed=5), threads=1) for name in ("whole", "shell")
+    )
+    assert not same_tables(wanted, shell_bake) and same_tables(made, wanted)
+
+
 def test_no_budget_leaves_everything_unknown(office, tmp_path):
     bake = viewcell.bake(office, tmp_path / "office", budget_s=1e-6)
     cells, objects = bake.graph.cell_count, bake.manifest["counts"]["objects"]
