@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .progress import LOG
 from .readers.units import METRES
 from .scene import OPAQUE, Scene
 
@@ -29,6 +30,10 @@ class Implausible:
     what: str
     do: str
 
+    def line(self) -> str:
+        """Both, in a line."""
+        return f"as it is read, {self.what}; {self.do}"
+
 
 def implausible(scene: Scene) -> list[Implausible]:
     """What is wrong with the sizes of a model as it was read from a file; empty where nothing is."""
@@ -36,6 +41,13 @@ def implausible(scene: Scene) -> list[Implausible]:
         return []
     # A model on its side has no heights to judge its unit by.
     return _axis(scene) or _unit(scene)
+
+
+def warned(scene: Scene) -> Scene:
+    """The scene itself; says in the log at once what is implausible of it, as what follows may take hours in vain."""
+    for fault in implausible(scene):
+        LOG.warning("warning: %s", fault.line())
+    return scene
 
 
 def _unit(scene: Scene) -> list[Implausible]:

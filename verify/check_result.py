@@ -91,6 +91,13 @@ class CheckResult:
     asked: dict[str, object] = field(default_factory=dict)
     boxes: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3), np.int32))
 
+    def __repr__(self) -> str:
+        """What came of it, on a line."""
+        wrong = {kind: sum(w.kind == kind for w in self.wrong) for kind in self.claimed}
+        found = ", ".join(counted(count, f"wrong-hidden {kind}") for kind, count in wrong.items())
+        outcome, cells = "ok" if self.ok else "failed", counted(len(self.sources), "view cell")
+        return f"<CheckResult {outcome}: {found} from {cells}, {self.rays:,} rays>"
+
     @property
     def ok(self) -> bool:
         """Nothing visible was found hidden."""

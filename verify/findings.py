@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..data.plural import counted
 from .proofs.certified import Certified
 from .rays.confidence import Confidence
 from .rays.embree import Caster
@@ -92,6 +93,12 @@ class VerifyResult:
     object_witnesses: Confirmed = field(default_factory=Confirmed)
     certificates: Certified | None = None
     seconds: dict[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """What came of it, on a line."""
+        found = f"{self.wrong_hidden:,} wrong-hidden" + (f" ({self.pair})" if self.pair else "")
+        refuted = counted(self.refuted, "refuted witness", "refuted witnesses")
+        return f"<VerifyResult {'ok' if self.ok else 'failed'}: {found}, {refuted}, {self.rays:,} rays>"
 
     @property
     def refuted(self) -> int:

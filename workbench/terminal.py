@@ -35,13 +35,14 @@ def watched(verbose: bool = False, quiet: bool = False) -> Iterator[None]:
         quiet: neither.
     """
     bars = sys.stderr.isatty() and not (verbose or quiet)
-    handler, level = logging.StreamHandler(), LOG.level
-    handler.setLevel(logging.DEBUG if verbose else logging.WARNING if quiet or bars else logging.INFO)
-    LOG.addHandler(handler)
-    LOG.setLevel(handler.level)
-    try:
-        with shown(bars), heartbeat():
+    with shown(bars), heartbeat():
+        # Made only now: beside bars, stderr is what writes above them.
+        handler, level = logging.StreamHandler(), LOG.level
+        handler.setLevel(logging.DEBUG if verbose else logging.WARNING if quiet or bars else logging.INFO)
+        LOG.addHandler(handler)
+        LOG.setLevel(handler.level)
+        try:
             yield
-    finally:
-        LOG.removeHandler(handler)
-        LOG.setLevel(level)
+        finally:
+            LOG.removeHandler(handler)
+            LOG.setLevel(level)

@@ -1,5 +1,7 @@
 """What is said where a package of an extra is missing."""
 
+import ast
+import re
 import sys
 import tomllib
 
@@ -19,6 +21,35 @@ def test_every_package_is_in_its_extra():
         assert not any(line.lower().startswith(package.lower()) for line in project["dependencies"]), package
     (everything,) = extras["all"]
     assert set(EXTRAS.values()) <= set(everything.partition("[")[2].rstrip("]").split(","))
+
+
+def imported(path):
+    """Modules that a file of ours imports, ours as paths and others by their package; those of type checkers too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield node.module.partition(".")[0]
+        elif isinstance(node, ast.ImportFrom):
+            base = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            yield from (place for name in ("", *(alias.name for alias in node.names))
+                        if (place := (base / name).with_suffix(".py")).is_file())  # fmt: skip
+
+
+def test_whoever_installs_tune_can_tune():
+    """Whatever its files import, and what of ours they do, comes with the extra."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    brought = {re.split("[<>=]", line)[0] for line in extras["tune"]}
+    todo, needed = [*(ROOT / "workbench/tune").glob("*.py")], set()
+    seen = set(todo)
+    while todo:
+        for found in imported(todo.pop()):
+            if isinstance(found, str):
+                needed.add(found)
+            elif found not in seen and "readers" not in found.parts:
+                seen.add(found)
+                todo.append(found)
+    assert {"jax", "matplotlib"} <= needed & set(EXTRAS) <= brought
 
 
 @pytest.mark.parametrize(("package", "file"), [("ifcopenshell", "a.ifc"), ("ezdxf", "a.dxf")])

@@ -191,7 +191,8 @@ def assert_baked_alike(plain_pairs, tmp_path, yaw_deg, **size):
 
 @pytest.mark.parametrize("yaw_deg", [17.0, 45.0])
 def test_a_turned_office_is_baked_as_one_on_the_axes(yaw_deg, plain_pairs, tmp_path):
-    assert_baked_alike(plain_pairs, tmp_path, yaw_deg, floors=2, rooms_per_side=1)
+    """Without furniture; the default office, with it, is among the slow tests."""
+    assert_baked_alike(plain_pairs, tmp_path, yaw_deg, floors=2, rooms_per_side=1, furnished=False)
 
 
 def test_claims_about_a_turned_scene_are_judged_in_the_frame_of_its_bake(tmp_path):
@@ -240,7 +241,8 @@ def test_a_box_around_a_turned_box():
 
 def test_a_turned_office_as_a_file_is_baked_as_one_on_the_axes(tmp_path):
     for name, yaw_deg in (("plain", 0.0), ("turned", 17.0)):
-        write_glb(make_office(floors=1, rooms_per_side=1, yaw_deg=yaw_deg), tmp_path / f"{name}.glb")
+        scene = make_office(floors=1, rooms_per_side=1, furnished=False, yaw_deg=yaw_deg)
+        write_glb(scene, tmp_path / f"{name}.glb")
     plain, made = (bake(tmp_path / f"{name}.glb", tmp_path / name, threads=1) for name in ("plain", "turned"))
     assert made.manifest["yaw_deg"] == pytest.approx(17.0, abs=1e-5)
     assert made.manifest["counts"]["cells"] == plain.manifest["counts"]["cells"]

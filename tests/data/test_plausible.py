@@ -1,5 +1,6 @@
 """Models in a wrong unit, or on their side, are noticed; buildings are not."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 import trimesh
 import viewcell
 from builders.places import SHARED
+from viewcell import InputError
 from viewcell.data.plausible import implausible
 from viewcell.data.scene import Space
 from viewcell.workbench.cli import main
@@ -85,6 +87,7 @@ def test_rooms_and_doors_go_before_storeys(tmp_path):
     assert not implausible(replace(scene, source=""))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (SHARED / "scenes").is_dir(), reason="shared scenes are not here")
 @pytest.mark.parametrize("name", ["ifc/kit_edc_sb/KIT-EDC_with_SB.ifc"])
 def test_real_buildings_are_plausible(name):
@@ -94,6 +97,24 @@ def test_real_buildings_are_plausible(name):
 def test_made_buildings_are_plausible():
     for scene in (viewcell.make_office(floors=1), viewcell.make_office(floors=2, rooms_per_side=2, wings=2)):
         assert not implausible(scene)
+
+
+@pytest.mark.parametrize(
+    ("command", "next_step"),
+    [("bake", "workbench.bake.run.PreparedModel"), ("inspect", "workbench.inspect.run.PreparedModel")],
+)
+@pytest.mark.parametrize("bars", [False, True])
+def test_it_is_said_before_hours_of_work(command, next_step, bars, tmp_path, monkeypatch, capsys):
+    def begun(scene):
+        raise InputError("the work begins")
+
+    monkeypatch.setattr(f"viewcell.{next_step}", begun)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: bars, raising=False)
+    assert main([command, str(written(tmp_path, tower(8, 0.4, 1.6)))]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    line = "warning: as it is read, its storeys are 0.2 m high; if its numbers are no metres: --unit "
+    assert line in said and said.index(line) < said.index("viewcell: the work begins")
 
 
 def test_bake_and_inspect_say_it(tmp_path, capsys):

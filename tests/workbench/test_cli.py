@@ -10,6 +10,7 @@ import viewcell
 from builders import four_rooms
 from viewcell.data.store.scene_folder import write_scene
 from viewcell.solvers.visibility.portal_engine import PortalEngine
+from viewcell.workbench.bake import blocks
 from viewcell.workbench.cli import main
 
 TABLES = ("meshes", "objects", "cells", "portals", "cell_to_cell", "cell_to_object")
@@ -170,25 +171,30 @@ def test_interrupted_before_the_end_leaves_no_bake(office, tmp_path, monkeypatch
     assert not (tmp_path / "o.bake").exists()
 
 
-def test_interrupted_bake_resumes_to_the_same_result(tmp_path):
-    scene, out, whole = tmp_path / "o.scene", tmp_path / "o.bake", tmp_path / "whole.bake"
-    write_scene(viewcell.make_office(floors=2, rooms_per_side=6, furnished=False), scene)
+def test_interrupted_bake_resumes_to_the_same_result(office, tmp_path, monkeypatch):
+    out, whole = tmp_path / "o.bake", tmp_path / "whole.bake"
+    monkeypatch.setattr(blocks, "BLOCK", 3)
     write_graph(tmp_path / "rooms")
     assert main(["bake", str(tmp_path / "rooms"), "--out", str(out), "--no-progress"]) == 0
-    old, arguments = hashes(out), ["bake", str(scene), "--overwrite", "--no-progress", "--out"]
+    old, arguments = hashes(out), ["bake", str(office), "--overwrite", "--no-progress", "--out"]
     # The signal comes in the middle of the second block, however fast the machine is; it is heard even where the tests
     # run in the background, where processes are born deaf to it.
     code = """
-import os, signal, sys, threading
+import os, signal, sys, threading, time
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from viewcell.solvers.visibility.portal_engine import PortalEngine
+from viewcell.workbench.bake import blocks
 from viewcell.workbench.cli import main
-visible, blocks = PortalEngine.visible, []
+blocks.BLOCK = 3
+visible, begun = PortalEngine.visible, []
 def interrupted(self, block):
-    blocks.append(block)
-    if len(blocks) == 2:
+    begun.append(block)
+    if len(begun) == 2:
         threading.Timer(0.02, os.kill, (os.getpid(), signal.SIGINT)).start()
-    return visible(self, block)
+    found = visible(self, block)
+    if len(begun) == 2:
+        time.sleep(60)
+    return found
 PortalEngine.visible = interrupted
 sys.exit(main(sys.argv[1:]))
 """

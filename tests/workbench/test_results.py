@@ -7,9 +7,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import viewcell
 from builders.places import ROOT
 from builders.random_buildings import two_solids
 from viewcell.data.store.scene_folder import write_scene
+from viewcell.verify.check_result import CheckResult
+from viewcell.verify.findings import VerifyResult
 from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
 from viewcell.workbench.results import as_json
@@ -71,6 +74,24 @@ def test_inspect_and_report_say_what_they_found(folder, capsys):
     assert told(capsys, "inspect", folder / "a.scene", "--no-estimate")["result"]["triangles"] == 24
     paths = told(capsys, "report", folder / "a.bake", "-o", folder / "page")["result"]
     assert all((folder / "page" / path).exists() for path in paths.values())
+
+
+def test_results_fit_on_a_line_that_says_what_matters(folder):
+    """As a notebook or a debugger shows them."""
+    made, none = load(folder / "a.bake"), np.zeros((2, 2), bool)
+    cut = made.potential_objects.copy()
+    cut[tuple(np.argwhere(cut)[0])] = False
+    judged, seen = made.verify(rays=1000), viewcell.inspect(made.scene, estimate=False)
+    checked = viewcell.check(made.scene, cut, made, rays=20_000, targets="objects")
+    for result, words in (
+        (judged, ("ok", "0 wrong-hidden", "0 refuted witnesses", f"{judged.rays:,} rays")),
+        (VerifyResult(wrong_hidden=1, pair="cell 1 sees cell 2"), ("failed", "1 wrong-hidden (cell 1 sees cell 2)")),
+        (checked, ("failed", "1 wrong-hidden object from 1 view cell")),
+        (CheckResult(np.arange(2), np.arange(2), [], {"cell": none}, {"cell": none}), ("ok", "0 wrong-hidden cells")),
+        (seen, ("fit to bake", f"{len(seen.warnings)} warning")),
+    ):
+        text = repr(result)
+        assert "\n" not in text and len(text) < 200 and all(word in text for word in words), text
 
 
 def test_what_fails_says_so_in_the_same_words(folder, capsys):

@@ -87,7 +87,7 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
     """
     scene = model.scene
     facts = scene_manifest(scene)
-    warnings = [f"as it is read, {fault.what}; {fault.do}" for fault in implausible(scene)]
+    warnings = [fault.line() for fault in implausible(scene)]
     if not model.closed:
         warnings.append("no closed opaque solid: only surfaces occlude, and every point counts as outside")
     if warnings:

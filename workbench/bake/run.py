@@ -13,6 +13,7 @@ from ...data.errors import InputError
 from ...data.graph import CellGraph
 from ...data.kept import cell_volumes
 from ...data.lod import object_errors, split_components
+from ...data.plausible import warned
 from ...data.prepared import PreparedModel
 from ...data.progress import shown
 from ...data.rooms import join_rooms
@@ -100,6 +101,8 @@ def bake(
     """
     settings = with_words(settings, words)
     settings.check()
+    if isinstance(model, Scene) and (told := [name for name in settings.reading if name in words]):
+        raise InputError(f"{told[0]}: expected a model file beside it, found a scene; viewcell.read takes it")
     check_number("budget", 1.0 if budget_s is None else budget_s, 1e-9)
     check_number("threads", 1 if threads is None else threads, 1)
     from ...kernels.launch import Device
@@ -153,7 +156,7 @@ def open_model(model: Scene | str | Path, settings: Settings) -> tuple[Scene | N
     if isinstance(model, Scene):
         from ...data.frame import in_frame
 
-        return in_frame(model, settings.frame.get("yaw", 0.0)), None
+        return warned(in_frame(model, settings.frame.get("yaw", 0.0))), None
     path = Path(model)
     bare = path.is_dir() and not (path / "manifest.json").exists()
     told = [*settings.reading, *(["yaw"] if bare and settings.yaw != "auto" else [])]
@@ -163,7 +166,7 @@ def open_model(model: Scene | str | Path, settings: Settings) -> tuple[Scene | N
         return None, path
     from ...data.readers import read
 
-    return read(path, **settings.reading, **settings.frame), None
+    return warned(read(path, **settings.reading, **settings.frame)), None
 
 
 def default_out(model: Scene | str | Path) -> Path:

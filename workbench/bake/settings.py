@@ -14,7 +14,9 @@ from ...solvers.levels.pixel_error import PixelLimit
 if TYPE_CHECKING:
     from ...solvers.visibility.projection import VlodSettings
 
+DOORS = ("open", "closed")
 METHODS = ("auto", "portals", "occluders", "both", "vlod")
+KINDS = {bool: "True or False", int: "a whole number", float: "a number", str: "a text"}
 DEEPEST = 12
 # Cells are not cut into smaller parts than this [m].
 SMALLEST_PART_M = 0.5
@@ -159,7 +161,11 @@ class Settings(LevelSettings, MethodSettings, CellSettings, ModelSettings):
             raise InputError(f"yaw: expected auto or degrees, found {self.yaw!r}") from None
 
     def check(self) -> None:
-        """Raise InputError for a value out of range."""
+        """Raise InputError for a value of another kind, or out of range."""
+        for field in fields(self):
+            _check_kind(field.name, getattr(self, field.name), type(field.default))
+        if self.doors not in DOORS:
+            raise InputError(f"doors: expected {' or '.join(DOORS)}, found {self.doors!r}")
         for name, value, least in (
             ("threshold", self.threshold_m2, 0.0),
             ("seal", self.seal, 0.0),
@@ -226,6 +232,13 @@ def with_words(settings: Settings | None, words: SettingsWords) -> Settings:
     # Paths and degrees are written as on the command line.
     told = {name: str(value) if name in ("cells", "yaw") else value for name, value in words.items()}
     return replace(settings or Settings(), **told)
+
+
+def _check_kind(name: str, value: object, kind: type) -> None:
+    """Refuse a value that is not of its default's kind: in Python nothing else would, and a text is true."""
+    fits = isinstance(value, int | float if kind is float else kind) and isinstance(value, bool) == (kind is bool)
+    if not fits:
+        raise InputError(f"{name}: expected {KINDS[kind]}, found {value!r}")
 
 
 def check_number(name: str, value: float, least: float) -> None:

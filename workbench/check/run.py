@@ -17,6 +17,7 @@ from ...data.graph import CellGraph
 from ...data.plural import counted
 from ...data.progress import phase, shown
 from ...data.scene import OPAQUE, Role, Scene
+from ...data.store.bake_folder import BakeFolder, read_bake
 from ...data.store.claims import Claims, read_claims
 from ...data.store.room_tables import read_room_table, words_of_cells
 from ...data.store.scene_folder import read_manifest
@@ -40,7 +41,7 @@ AGAIN = 512
 
 
 def check(
-    model: Scene | str | Path,
+    model: Scene | BakeFolder | str | Path,
     pvs: object = None,
     cells: object = None,
     *,
@@ -53,13 +54,13 @@ def check(
     """Look for visible things that claimed sets hide.
 
     Args:
-        model: a scene, or a path: whatever `read` takes, a bake folder, a folder of cells.parquet and portals.parquet,
-            or a compiled map (.bsp with its .prt, or .prt); the last two are judged by their portals, unless view cells
-            beside a .bsp say that it is meant as a model.
+        model: a scene, a bake, or a path: whatever `read` takes, a bake folder, a folder of cells.parquet and
+            portals.parquet, or a compiled map (.bsp with its .prt, or .prt); the last two are judged by their portals,
+            unless view cells beside a .bsp say that it is meant as a model.
         pvs: what is claimed to be potentially visible: a table or matrix as `data.store.claims.read_claims` takes it,
             or several in a list.
         cells: view cells: a table of boxes (a path, or anything that pyarrow makes a table of) in the model's own
-            metres, or a bake folder. By default those of the model, if it is a bake or a cell graph.
+            metres, or a bake or its folder. By default those of the model, if it is a bake or a cell graph.
         rays: to cast.
         seed: of the rays.
         targets: "objects" or "cells", where a matrix could have either as columns.
@@ -76,6 +77,7 @@ def check(
     if rays < 1:
         raise InputError(f"rays: expected 1 or more, found {rays}")
     start = time.perf_counter()
+    model, cells = _place(model), _place(cells)
     if isinstance(model, str | Path) and _has_portals(Path(model), cells):
         from .map import check_map
 
@@ -110,7 +112,12 @@ def check(
 
 
 def assert_conservative(
-    pvs: object, scene: Scene | str | Path, cells: object = None, *, rays: int = 1_000_000, **options: object
+    pvs: object,
+    scene: Scene | BakeFolder | str | Path,
+    cells: object = None,
+    *,
+    rays: int = 1_000_000,
+    **options: object,
 ) -> CheckResult:
     """Fail where claimed sets hide what is visible.
 
@@ -129,8 +136,7 @@ def assert_conservative(
         InputError: as for `check`.
     """
     __tracebackhide__ = True
-    # A bake is known by its folder, so that no heavy module is imported for nothing.
-    pvs = getattr(pvs, "folder", pvs)
+    pvs = _place(pvs)
     if cells is None and isinstance(pvs, str | Path) and (Path(pvs) / "manifest.json").is_file():
         cells = pvs
     result = check(scene, pvs, cells, rays=rays, **options)
@@ -148,7 +154,12 @@ def _has_portals(model: Path, cells: object) -> bool:
 
 
 def _sources(pvs: object) -> Sequence[object]:
-    return [] if pvs is None else list(pvs) if isinstance(pvs, list | tuple) else [pvs]
+    return [] if pvs is None else [_place(part) for part in (pvs if isinstance(pvs, list | tuple) else [pvs])]
+
+
+def _place(given: object) -> object:
+    """The folder of a bake in its place; anything else as it is."""
+    return given.folder if isinstance(given, BakeFolder) else given
 
 
 def _baked_yaw(cells: object) -> float:
@@ -179,8 +190,6 @@ def open_model(model: Scene | str | Path, reading: dict[str, object]) -> tuple[S
 
         return read_graph(path)[0]
     if path.is_dir() and read_kind(path) == "bake":
-        from ...data.store.bake_folder import read_bake
-
         bake = read_bake(path)
         return bake.graph if bake.scene is None else (bake.scene, path)
     from ...data.readers import read

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 
 from ...data.carving import Faces
+from ...data.plural import counted
 from ...data.scene import Scene
 from .cells import Cells
 from .surfaces import Directions, Surfaces
@@ -53,6 +54,11 @@ class Inspection:
     differences: list[str] | None = None
     warnings: list[Warning] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        """What it is of and how it is, on a line."""
+        outcome = "fit to bake" if self.ok else "not fit to bake"
+        return f"<Inspection {self.scene.source!r}: {outcome}, {counted(len(self.warnings), 'warning')}>"
 
     @property
     def ok(self) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...data.carving import find_faces
 from ...data.errors import InputError
+from ...data.plausible import warned
 from ...data.prepared import PreparedModel
 from ...data.scene import Scene
 from .cells import find_cells
@@ -42,7 +43,7 @@ def inspect(
     Raises:
         InputError: the model is unreadable, or there is no second reader for its format.
     """
-    scene = _scene(model, reading)
+    scene = warned(_scene(model, reading))
     prepared = PreparedModel(scene)
     found = Inspection(
         scene=scene,

@@ -31,8 +31,14 @@ def office():
 
 
 @pytest.fixture(scope="module")
-def small_office():
-    return make_office(floors=1, rooms_per_side=1)
+def shell():
+    """The office without furniture."""
+    return make_office(floors=1, rooms_per_side=3, furnished=False)
+
+
+@pytest.fixture(scope="module")
+def small_shell():
+    return make_office(floors=1, rooms_per_side=1, furnished=False)
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +98,7 @@ def test_projection_points_hide_nothing_seen_and_less_than_occluders(office, cel
 
 
 def test_both_on_portal_cells_hides_no_less_and_sees_as_much(tmp_path):
-    scene = make_office(floors=1, rooms_per_side=2)
+    scene = make_office(floors=1, rooms_per_side=2, furnished=False)
     portals, both = (
         bake(scene, tmp_path / f"{method}.bake", settings=Settings(method=method)) for method in ("portals", "both")
     )
@@ -116,13 +122,13 @@ def test_answers_do_not_depend_on_threads(office, cells, by_occluders, tmp_path)
     assert two.cell_to_object.equals(by_occluders.cell_to_object)
 
 
-def test_octree_refines_where_much_is_unknown_or_seen(small_office, tmp_path):
+def test_octree_refines_where_much_is_unknown_or_seen(small_shell, tmp_path):
     def made(**settings):
         settings = Settings(method="occluders", cell_size_m=6.0, **settings)
-        return bake(small_office, tmp_path / "tree.bake", settings=settings, overwrite=True)
+        return bake(small_shell, tmp_path / "tree.bake", settings=settings, overwrite=True)
 
     coarse = made(depth=0)
-    triangles = small_office.triangle_counts
+    triangles = small_shell.triangle_counts
     load_of = coarse.potential_objects @ triangles
     some = made(depth=1, refine_triangles=int(np.median(load_of)), refine_gap=1.0)
     assert coarse.graph.cell_count < some.graph.cell_count
@@ -134,20 +140,20 @@ def test_octree_refines_where_much_is_unknown_or_seen(small_office, tmp_path):
     assert (load_of[kept] <= np.median(load_of)).all()
 
 
-def test_an_octree_under_a_budget_keeps_what_it_did_not_reach(small_office, tmp_path):
+def test_an_octree_under_a_budget_keeps_what_it_did_not_reach(small_shell, tmp_path):
     settings = Settings(method="occluders", cell_size_m=8.0, depth=1, refine_triangles=1)
-    made = bake(small_office, tmp_path / "tree.bake", settings=settings, budget_s=1e-6)
+    made = bake(small_shell, tmp_path / "tree.bake", settings=settings, budget_s=1e-6)
     assert made.manifest["budget_spent"] and made.potential_objects.all()
-    bake(small_office, tmp_path / "tree.bake", settings=settings, budget_s=0.4)
-    again = bake(small_office, tmp_path / "tree.bake", settings=settings)
+    bake(small_shell, tmp_path / "tree.bake", settings=settings, budget_s=0.4)
+    again = bake(small_shell, tmp_path / "tree.bake", settings=settings)
     assert not again.manifest["budget_spent"] and not again.potential_objects.all()
-    whole = bake(small_office, tmp_path / "whole.bake", settings=settings)
+    whole = bake(small_shell, tmp_path / "whole.bake", settings=settings)
     assert again.cell_to_object.equals(whole.cell_to_object)
 
 
-def test_a_spent_budget_is_told_without_refinement(office, tmp_path):
+def test_a_spent_budget_is_told_without_refinement(shell, tmp_path):
     settings = Settings(method="occluders", cell_size_m=8.0, depth=0)
-    assert bake(office, tmp_path / "tree.bake", settings=settings, budget_s=1e-6).manifest["budget_spent"]
+    assert bake(shell, tmp_path / "tree.bake", settings=settings, budget_s=1e-6).manifest["budget_spent"]
 
 
 def test_a_scene_without_solids_is_baked_with_a_warning(tmp_path, capsys):
@@ -244,9 +250,9 @@ def test_back_faces_are_counted_apart(by_occluders):
 
 
 @pytest.mark.parametrize("method", ["portals", "both"])
-def test_view_cells_beyond_the_portal_graph_are_refused(office, method, tmp_path):
+def test_view_cells_beyond_the_portal_graph_are_refused(shell, method, tmp_path):
     cells = write_cells(tmp_path / "cells.csv", [BOXES[0], [-6, 2, 1, -5, 3, 2]])
     with pytest.raises(InputError, match=r"within 2 m of the model, found cell 1 beyond"):
-        bake(office, tmp_path / "no.bake", settings=Settings(method=method, cells=cells))
-    made = bake(office, tmp_path / "yes.bake", settings=Settings(method="occluders", cells=cells))
+        bake(shell, tmp_path / "no.bake", settings=Settings(method=method, cells=cells))
+    made = bake(shell, tmp_path / "yes.bake", settings=Settings(method="occluders", cells=cells))
     assert made.verify(rays=100_000).ok and made.potential_objects[1].any()

@@ -38,7 +38,16 @@ def test_both_readers_agree_on_shared_cases(path):
 
 
 @pytest.mark.skipif(not SCENES.is_dir(), reason="no shared scenes folder beside the checkout")
-@pytest.mark.parametrize("name", ["complex.obj", "institute.obj", "engel_house.obj", "room.glb", "clinic_arch.obj"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "complex.obj",
+        "institute.obj",
+        "engel_house.obj",
+        "room.glb",
+        pytest.param("clinic_arch.obj", marks=pytest.mark.slow),
+    ],
+)
 def test_both_readers_agree_on_shared_scenes(name):
     (path,) = SCENES.glob(f"*/{name}")
     assert compared(path, UPS.get(name)) == []

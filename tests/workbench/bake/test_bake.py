@@ -42,6 +42,17 @@ def office_bake(office, tmp_path_factory):
     return viewcell.bake(office, tmp_path_factory.mktemp("bake") / "office", threads=1)
 
 
+@pytest.fixture(scope="module")
+def shell():
+    """The office without furniture: as many cells, a fifth of the objects."""
+    return make_office(floors=1, rooms_per_side=2, furnished=False)
+
+
+@pytest.fixture(scope="module")
+def shell_bake(shell, tmp_path_factory):
+    return viewcell.bake(shell, tmp_path_factory.mktemp("bake") / "shell", threads=1)
+
+
 def same_tables(one, other):
     return all(getattr(one, name).equals(getattr(other, name)) for name in (*TABLES, *ROOM_TABLES)) and all(
         (one.folder / f"{name}.parquet").read_bytes() == (other.folder / f"{name}.parquet").read_bytes()
@@ -128,10 +139,14 @@ def test_bare_graph_is_two_sided(name, rows, tmp_path):
     assert bake.cell_to_cell.num_rows == rows and bake.cell_to_object.num_rows == 0
 
 
-@pytest.mark.parametrize(("threads", "block"), [(1, 24), (2, 24), (2, 1), (1, 3), (2, 5)])
-def test_repeats_threads_and_blocks_change_nothing(threads, block, office, office_bake, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("model", "threads", "block"),
+    [("shell", 1, 24), ("shell", 2, 24), ("shell", 2, 1), ("shell", 1, 3), ("shell", 2, 5), ("office", 2, 3)],
+)
+def test_repeats_threads_and_blocks_change_nothing(model, threads, block, tmp_path, monkeypatch, request):
+    scene, before = request.getfixturevalue(model), request.getfixturevalue(f"{model}_bake")
     monkeypatch.setattr(blocks, "BLOCK", block)
-    assert same_tables(viewcell.bake(office, tmp_path / "again", threads=threads), office_bake)
+    assert same_tables(viewcell.bake(scene, tmp_path / "again", threads=threads), before)
 
 
 @pytest.mark.parametrize("name", ["office", "w48"])
@@ -160,32 +175,45 @@ def stop_after(count, monkeypatch):
 
 
 @pytest.mark.parametrize("lost", [None, 0, 1])
-def test_resuming_equals_never_stopping(lost, office, office_bake, tmp_path, monkeypatch):
+def test_resuming_equals_never_stopping(lost, shell, shell_bake, tmp_path, monkeypatch):
     """Stopped after two blocks; one of them is lost or cut short on top."""
     monkeypatch.setattr(blocks, "BLOCK", 3)
     with monkeypatch.context() as patch:
         stop_after(2, patch)
         with pytest.raises(Stopped):
-            viewcell.bake(office, tmp_path / "office")
-    assert not (tmp_path / "office").exists()
+            viewcell.bake(shell, tmp_path / "shell")
+    assert not (tmp_path / "shell").exists()
     partial = next(tmp_path.iterdir())
     if lost == 0:
         (partial / "0.arrow").unlink()
     if lost == 1:
         (partial / "1.arrow").write_bytes((partial / "1.arrow").read_bytes()[:100])
-    assert same_tables(viewcell.bake(office, tmp_path / "office"), office_bake)
-    assert [path.name for path in tmp_path.iterdir()] == ["office"]
+    assert same_tables(viewcell.bake(shell, tmp_path / "shell"), shell_bake)
+    assert [path.name for path in tmp_path.iterdir()] == ["shell"]
 
 
-def test_blocks_of_another_size_are_not_taken_for_ours(office, office_bake, tmp_path, monkeypatch):
+def test_blocks_of_another_size_are_not_taken_for_ours(shell, shell_bake, tmp_path, monkeypatch):
     """What an older version left behind may be cut into blocks differently."""
     monkeypatch.setattr(blocks, "BLOCK", 3)
     with monkeypatch.context() as patch:
         stop_after(2, patch)
         with pytest.raises(Stopped):
-            viewcell.bake(office, tmp_path / "office")
+            viewcell.bake(shell, tmp_path / "shell")
     monkeypatch.setattr(blocks, "BLOCK", 5)
-    assert same_tables(viewcell.bake(office, tmp_path / "office"), office_bake)
+    assert same_tables(viewcell.bake(shell, tmp_path / "shell"), shell_bake)
+
+
+def test_blocks_of_other_settings_are_not_taken_for_ours(shell, shell_bake, tmp_path, monkeypatch):
+    """A bake that was stopped does not go on as one of other settings."""
+    monkeypatch.setattr(blocks, "BLOCK", 3)
+    with monkeypatch.context() as patch:
+        stop_after(2, patch)
+        with pytest.raises(Stopped):
+            viewcell.bake(shell, tmp_path / "shell", threads=1)
+    wanted, made = (
+        viewcell.bake(shell, tmp_path / name, settings=Settings(seed=5), threads=1) for name in ("whole", "shell")
+    )
+    assert not same_tables(wanted, shell_bake) and same_tables(made, wanted)
 
 
 def test_no_budget_leaves_everything_unknown(office, tmp_path):
@@ -209,25 +237,25 @@ def test_what_is_seen_at_a_glance_is_kept_when_the_budget_ends(office, office_ba
     assert check_two_sided(bake, rays=20_000).ok
 
 
-def test_a_spent_budget_is_made_up_for(office, office_bake, tmp_path):
+def test_a_spent_budget_is_made_up_for(shell, shell_bake, tmp_path):
     """A bake that ran out of time is not taken for a finished one."""
-    viewcell.bake(office, tmp_path / "office", budget_s=1e-6)
-    assert same_tables(viewcell.bake(office, tmp_path / "office"), office_bake)
+    viewcell.bake(shell, tmp_path / "shell", budget_s=1e-6)
+    assert same_tables(viewcell.bake(shell, tmp_path / "shell"), shell_bake)
 
 
-def test_a_finished_bake_is_kept_and_a_changed_one_is_not(office, office_bake, tmp_path):
-    first = viewcell.bake(office, tmp_path / "office")
+def test_a_finished_bake_is_kept_and_a_changed_one_is_not(shell, shell_bake, tmp_path):
+    first = viewcell.bake(shell, tmp_path / "shell")
     path = first.folder / "manifest.json"
     stamp = path.stat().st_mtime_ns
-    viewcell.bake(office, tmp_path / "office")
+    viewcell.bake(shell, tmp_path / "shell")
     assert path.stat().st_mtime_ns == stamp
     with pytest.raises(InputError, match="expected a bake of this model with these settings, found one with seed 0;"):
-        viewcell.bake(office, tmp_path / "office", settings=Settings(seed=5))
+        viewcell.bake(shell, tmp_path / "shell", settings=Settings(seed=5))
     assert path.stat().st_mtime_ns == stamp
-    other = viewcell.bake(office, tmp_path / "office", settings=Settings(seed=5), overwrite=True)
+    other = viewcell.bake(shell, tmp_path / "shell", settings=Settings(seed=5), overwrite=True)
     assert path.stat().st_mtime_ns != stamp and other.manifest["settings"]["seed"] == 5
-    assert pairs(load(tmp_path / "office").cell_to_cell, "reached_cell_id") == pairs(
-        office_bake.cell_to_cell, "reached_cell_id"
+    assert pairs(load(tmp_path / "shell").cell_to_cell, "reached_cell_id") == pairs(
+        shell_bake.cell_to_cell, "reached_cell_id"
     )
 
 
@@ -366,6 +394,9 @@ def test_a_bake_of_view_cells_that_were_changed_is_not_kept(tmp_path):
         ({"settings": Settings(refine_kept=0.5)}, "refine-kept"),
         ({"settings": Settings(refine_kept=2.0, cells="octree")}, "refine-kept"),
         ({"settings": Settings(method="occluders", cells="portals")}, "cells"),
+        # What a scene was not read with, it would do without in silence.
+        ({"doors": "closed"}, "doors"),
+        ({"glass": "curtain"}, "glass"),
     ],
 )
 def test_bad_arguments_are_one_line(options, message, office, tmp_path):

@@ -28,6 +28,11 @@ def office():
     return viewcell.make_office(floors=1, rooms_per_side=2)
 
 
+@pytest.fixture(scope="module")
+def shell():
+    return viewcell.make_office(floors=1, rooms_per_side=2, furnished=False)
+
+
 def over_everything(scene, folder):
     """A table with one view cell over the whole model."""
     low, high = scene.bounds() * scene.grid_m + scene.origin
@@ -74,17 +79,17 @@ def test_a_budget_that_ends_early_is_told(office, tmp_path):
     }  # fmt: skip
 
 
-def test_a_budget_that_ends_in_the_middle_advises_one_that_is_enough(office, tmp_path, monkeypatch):
+def test_a_budget_that_ends_in_the_middle_advises_one_that_is_enough(shell, tmp_path, monkeypatch):
     """Every cell takes a second, and with witnesses two: as guessed, and as measured of the first."""
     clock = Clock(monkeypatch, {False: 1.0, True: 2.0})
-    facts = viewcell.bake(office, tmp_path / "a", threads=1, budget_s=2.5).manifest
+    facts = viewcell.bake(shell, tmp_path / "a", threads=1, budget_s=2.5).manifest
     count = facts["counts"]["inhabitable"]
     needed = 1.0 * PROBE + 2.0 * (PROBE + count)
     assert clock.calls == [False] * 2
     assert facts["budget"] | {"pairs": 0} == {
         "budget_s": 2.5, "phase": "hiding", "cells": count, "pairs": 0, "needed_s": needed,
     }  # fmt: skip
-    facts = viewcell.bake(office, tmp_path / "b", threads=1, budget_s=count + 6.5).manifest
+    facts = viewcell.bake(shell, tmp_path / "b", threads=1, budget_s=count + 6.5).manifest
     assert clock.calls[2:] == [False, True] + [False] * count + [True]
     assert facts["budget"]["phase"] == "witnesses" and facts["budget"]["cells"] == count - 1
     assert facts["budget"]["needed_s"] == needed - 2.0
@@ -92,16 +97,16 @@ def test_a_budget_that_ends_in_the_middle_advises_one_that_is_enough(office, tmp
     advised = float(facts["warnings"][-1].partition("--budget ")[2].partition(" ")[0])
     assert needed - 2.0 < advised < 1.4 * needed
     clock.calls.clear()
-    assert viewcell.bake(office, tmp_path / "c", threads=1, budget_s=advised).manifest["budget_spent"] is False
+    assert viewcell.bake(shell, tmp_path / "c", threads=1, budget_s=advised).manifest["budget_spent"] is False
     assert clock.calls == [False, True] + [True] * count
 
 
-def test_an_octree_that_is_not_refined_is_told(office, tmp_path, monkeypatch):
+def test_an_octree_that_is_not_refined_is_told(shell, tmp_path, monkeypatch):
     """The roots take a second each, and so do their children: time for two pieces, the roots, and two families."""
     settings = Settings(method="occluders", cell_size_m=8.0, depth=1, refine_triangles=1)
-    roots = viewcell.bake(office, tmp_path / "roots", settings=replace(settings, depth=0)).graph.cell_count
+    roots = viewcell.bake(shell, tmp_path / "roots", settings=replace(settings, depth=0)).graph.cell_count
     Clock(monkeypatch, {False: 1.0, True: 1.0}, ViewCellEngine)
-    facts = viewcell.bake(office, tmp_path / "tree", settings=settings, threads=1, budget_s=roots + 4.5).manifest
+    facts = viewcell.bake(shell, tmp_path / "tree", settings=settings, threads=1, budget_s=roots + 4.5).manifest
     assert facts["budget"] | {"pairs": 0} == {
         "budget_s": roots + 4.5, "phase": "octree", "cells": roots - 2, "pairs": 0, "needed_s": 2.0 * roots + 2.0,
     }  # fmt: skip

@@ -413,6 +413,8 @@ def test_a_bake_needs_no_cells(tmp_path, house):
     result = assert_conservative(made, house.scene, rays=RAYS)
     assert result.ok and set(result.claimed) == {"object", "cell"}
     assert check(tmp_path / "house.bake", tmp_path / "house.bake", rays=RAYS).ok
+    # Wherever its folder goes, the bake itself does.
+    assert check(made, [made], made, rays=RAYS).ok and check(house.scene, made, made, rays=RAYS).ok
 
 
 def test_assert_conservative_fails_usefully(house, claims):

@@ -2,13 +2,14 @@
 
 import json
 import re
+from contextlib import redirect_stdout
+from io import StringIO
 
 import pytest
 from viewcell.data.buildings.office import make_office
 from viewcell.workbench.bake.run import bake
 from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.bake.settings_file import read_settings
-from viewcell.workbench.baked import load
 from viewcell.workbench.cli import main
 from viewcell.workbench.tune import points as tune_points
 from viewcell.workbench.tune.candidates import Candidate, front_of
@@ -21,17 +22,34 @@ def baked(tmp_path_factory):
     return out
 
 
-@pytest.fixture
-def quick(monkeypatch):
-    monkeypatch.setattr(tune_points, "CLUSTERS", (1, 6))
-    monkeypatch.setattr(tune_points, "RESOLUTIONS", (64,))
-    monkeypatch.setattr(tune_points, "EVALUATIONS", 4)
+@pytest.fixture(scope="module", autouse=True)
+def quick():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tune_points, "CLUSTERS", (1, 6))
+        patch.setattr(tune_points, "RESOLUTIONS", (64,))
+        patch.setattr(tune_points, "EVALUATIONS", 4)
+        yield
 
 
-def test_tuning_recommends_what_bake_takes(baked, quick, tmp_path, capsys):
-    folder = tmp_path / "t"
-    assert main(["tune", "projection-point", str(baked), "--cells", "2", "--out", str(folder), "--no-progress"]) == 0
-    said = capsys.readouterr().out
+@pytest.fixture(scope="module")
+def tuned(baked, quick, tmp_path_factory):
+    """A tuning by the command line: the folder that it wrote, what it said, and what it had found."""
+    folder, found = tmp_path_factory.mktemp("tuned") / "t", []
+
+    def noted(*arguments, **options):
+        found.append(honest(*arguments, **options))
+        return found[0]
+
+    honest = tune_points.tune_projection_point
+    asked = ["tune", "projection-point", str(baked), "--cells", "2", "--out", str(folder), "--no-progress"]
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(StringIO()) as said:
+        patch.setattr(tune_points, "tune_projection_point", noted)
+        assert main(asked) == 0
+    return folder, said.getvalue(), found[0]
+
+
+def test_tuning_recommends_what_bake_takes(tuned):
+    folder, said, _ = tuned
     assert "recommended: " in said and "Clarabel" in said
     content = json.loads((folder / "tune-projection-point.json").read_text())
     assert all(c["wrong hidden"] == 0 and c["potential / seen"] >= 1 for c in content["candidates"])
@@ -45,8 +63,8 @@ def test_tuning_recommends_what_bake_takes(baked, quick, tmp_path, capsys):
     assert len(list(folder.iterdir())) == 3
 
 
-def test_solvers_answer_the_same_programmes(baked, quick, tmp_path):
-    found = tune_points.tune_projection_point(load(baked), cells=2, out=tmp_path / "t")
+def test_solvers_answer_the_same_programmes(tuned):
+    _, _, found = tuned
     rows = {row.name: row for row in found.solvers}
     best = rows["interior point, JAX float64, batched"]
     assert best.gap < 1e-8 and best.violation_m < 1e-12 and re.fullmatch(r"\d+ solved", best.statuses)
@@ -54,7 +72,7 @@ def test_solvers_answer_the_same_programmes(baked, quick, tmp_path):
     assert found.wrong_hidden == 0
 
 
-def test_a_setting_that_hides_what_is_seen_fails(baked, quick, tmp_path, capsys, monkeypatch):
+def test_a_setting_that_hides_what_is_seen_fails(baked, tmp_path, capsys, monkeypatch):
     def hide(self, settings, chooser, boxes):
         hidden, stats = honest(self, settings, chooser, boxes)
         return hidden | True, stats
