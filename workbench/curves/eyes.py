@@ -275,7 +275,7 @@ def eyes_lines(found: EyesMissed) -> str:
     lines.append(
         f"eyes saw {counted(found.beyond, 'pair')} without a witness: "
         f"{found.wrong_hidden} hidden wrongly, {found.confirmed} unknown that are visible by an exact test, "
-        f"{found.beyond - found.wrong_hidden - found.confirmed} others, where rays graze"
+        f"{found.beyond - found.wrong_hidden - found.confirmed} that an exact test does not show"
     )
     if found.dark:
         lines.append(f"{counted(found.dark, 'cell')} left out, with too few points outside solids")
