@@ -43,6 +43,7 @@ SLOT_SIZE = wp.constant(slot_size(MAX_DEPTH + 1))
 # Integers per level: cell, next entry of its adjacency, the level that was decided last, and six row counts.
 FRAME = wp.constant(9)
 AT_COUNTS = wp.constant(3)
+OPEN = wp.constant(-1)
 STACK_SIZE = wp.constant((MAX_DEPTH + 1) * FRAME)
 
 
@@ -69,7 +70,12 @@ def slot_at(number: int) -> Slot:
 
 @wp.struct
 class Found:
-    """Where a search reports: one row per pair that it saw for the first time."""
+    """Where a search reports: a row for a pair that it saw for the first time, or that it first had to leave open.
+
+    The octant of a pair that is left open is OPEN, and it has no line; `reached` says whether it is still so.
+    """
+
+    reached: wp.array2d[wp.uint8]
 
     count: wp.array[int]
     pair: wp.array[wp.vec3i]
@@ -141,20 +147,22 @@ def report_reached(
     octant: int,
     child: int,
     work: wp.array[f64],
-    reached_out: wp.array2d[wp.uint8],
     found_out: Found,
 ):
     """Mark a cell as reached, and write down the line of the first sequence that surely reaches it."""
-    code = reached_out[row, behind]
+    code = found_out.reached[row, behind]
     if verdict == Verdict.VISIBLE and code != wp.uint8(Verdict.VISIBLE):
-        reached_out[row, behind] = wp.uint8(Verdict.VISIBLE)
+        found_out.reached[row, behind] = wp.uint8(Verdict.VISIBLE)
         spot = wp.atomic_add(found_out.count, 0, 1)
         if spot < found_out.pair.shape[0]:
             found_out.pair[spot] = wp.vec3i(row, behind, octant)
             found_out.line[spot] = direction(work, child)
             found_out.offset[spot] = offsets(level_maxima(work, child))
     if verdict == Verdict.UNKNOWN and code == wp.uint8(Verdict.HIDDEN):
-        reached_out[row, behind] = wp.uint8(Verdict.UNKNOWN)
+        found_out.reached[row, behind] = wp.uint8(Verdict.UNKNOWN)
+        spot = wp.atomic_add(found_out.count, 0, 1)
+        if spot < found_out.pair.shape[0]:
+            found_out.pair[spot] = wp.vec3i(row, behind, OPEN)
 
 
 @wp.kernel
@@ -168,7 +176,6 @@ def _flood(
     slots: int,
     work: wp.array[f64],
     frames: wp.array[int],
-    reached_out: wp.array2d[wp.uint8],
     tests_out: wp.array2d[int],
     found_out: Found,
 ):
@@ -194,7 +201,7 @@ def _flood(
                     verdict = cross_portal(graph, entry, octant, depth, slot, work, frames)
                     if verdict != Verdict.HIDDEN:
                         child = slot.levels + (depth + 1) * LEVEL_SIZE
-                        report_reached(verdict, row, entry[1], octant, child, work, reached_out, found_out)
+                        report_reached(verdict, row - first, entry[1], octant, child, work, found_out)
                         depth += 1
                         if depth == MAX_DEPTH:
                             tests = -1
@@ -203,9 +210,11 @@ def _flood(
         row += slots
 
 
-# Sources per CPU launch: what they find is collected after each, so a launch's room is this times the number of cells.
+# Sources per CPU launch: what they find is collected after each.
 CHUNK = 64
-# Pairs that a GPU launch has room for, 60 bytes each.
+# Pairs that a CPU launch has room for at first, 60 bytes each; one that finds more is repeated with more room.
+ROOM = 2**16
+# Pairs that a GPU launch has room for.
 GPU_ROOM = 2**25
 
 
@@ -218,7 +227,7 @@ class FloodAnswers:
             has a line for the pair.
         line: w of each pair's line, float64, shape (n, 3), as in `TargetAnswers`.
         offset: its xi.
-        undecided: (row, cell) pairs that only a line too thin to decide reaches, shape (sources, cells), bool.
+        undecided: (row, cell) pairs that only a line too thin to decide reaches, shape (m, 2), int32, sorted.
         complete: rows of sources whose search ended before its cap: what they did not reach is hidden, exactly.
         tests: stabbing decisions.
     """
@@ -230,6 +239,21 @@ class FloodAnswers:
     complete: np.ndarray
     tests: int
 
+    def replaced(self, rows: np.ndarray, others: "FloodAnswers") -> "FloodAnswers":
+        """The same with some rows, ascending, as others found them; their row k is rows[k] here."""
+        kept, own = np.ones(len(self.complete), bool), self.complete.copy()
+        kept[rows], own[rows] = False, others.complete
+        old, open_ = kept[self.pairs[:, 0]], kept[self.undecided[:, 0]]
+        pairs, left = others.pairs.copy(), others.undecided.copy()
+        pairs[:, 0], left[:, 0] = rows[pairs[:, 0]], rows[left[:, 0]]
+        pairs, left = np.concatenate([self.pairs[old], pairs]), np.concatenate([self.undecided[open_], left])
+        order, places = (np.lexsort((found[:, 1], found[:, 0])) for found in (pairs, left))
+        line, offset = (
+            np.concatenate([mine[old], theirs])[order]
+            for mine, theirs in ((self.line, others.line), (self.offset, others.offset))
+        )
+        return FloodAnswers(pairs[order], line, offset, left[places], own, self.tests + others.tests)
+
 
 def launch_flood(
     graph: DeviceGraph,
@@ -239,7 +263,7 @@ def launch_flood(
     cap: int,
     device: Device = CPU,
 ) -> FloodAnswers:
-    """Flood from every source, octant by octant.
+    """Flood from every source, octant by octant; memory grows with what is found, not with sources times cells.
 
     Args:
         graph: on the same device.
@@ -250,35 +274,49 @@ def launch_flood(
         device: where to.
     """
     count, cells = len(sources), graph.cell_lo.shape[0]
-    source = device.array(sources, int)
-    reached, tests = device.zeros((count, cells), wp.uint8), device.zeros((count, 8), int)
+    source, tests = device.array(sources, int), device.zeros((count, 8), int)
     rooms: dict[int, Found] = {}
     chunk = CHUNK if device.is_cpu else max(CHUNK, GPU_ROOM // cells)
-    gathered: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    rows = min(chunk, count)
+    gathered: list[tuple[np.ndarray, ...]] = []
+
+    def room(most: int) -> Found:
+        return device.struct(Found, reached=(rows, cells), count=1, pair=most, line=most, offset=most)
 
     def launch(first: int, last: int, slots: int, work: wp.array, frames: wp.array) -> None:
         # Each thread brings its own scratch, and keeps its own room for what it finds.
         found = rooms.get(work.ptr)
         if found is None:
-            room = min(chunk, count) * cells
-            found = rooms[work.ptr] = device.struct(Found, count=1, pair=room, line=room, offset=room)
-        found.count.zero_()
-        for octant in octants:
-            inputs = [graph, source, octant, cap, first, last, slots, work, frames]
-            wp.launch(_flood, dim=slots, inputs=inputs, outputs=[reached, tests, found], device=device.name)
-        used = int(found.count.numpy()[0])
-        gathered.append(tuple(x[:used].numpy().copy() for x in (found.pair, found.line, found.offset)))
+            found = rooms[work.ptr] = room(min(rows * cells, ROOM if device.is_cpu else GPU_ROOM))
+        while True:
+            found.count.zero_()
+            found.reached.zero_()
+            for octant in octants:
+                inputs = [graph, source, octant, cap, first, last, slots, work, frames]
+                wp.launch(_flood, dim=slots, inputs=inputs, outputs=[tests, found], device=device.name)
+            used = int(found.count.numpy()[0])
+            if used <= found.pair.shape[0]:
+                break
+            found = rooms[work.ptr] = room(2 * used)
+        pairs, line, offset = (x[:used].numpy().copy() for x in (found.pair, found.line, found.offset))
+        sure = pairs[:, 2] != OPEN
+        left = pairs[~sure, :2]
+        if len(left):
+            left = left[found.reached.numpy()[left[:, 0], left[:, 1]] == Verdict.UNKNOWN]
+        pairs[:, 0] += first
+        left[:, 0] += first
+        gathered.append((pairs[sure], line[sure], offset[sure], left))
 
     scratch = Scratch(int(SLOT_SIZE), int(STACK_SIZE))
     run_sliced(launch, count, _flood.module, device, scratch=scratch, chunk=chunk, gpu_chunk=chunk)
-    pairs, line, offset = (np.concatenate(column) for column in zip(*gathered, strict=True))
-    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    pairs, line, offset, undecided = (np.concatenate(column) for column in zip(*gathered, strict=True))
+    order, left = (np.argsort(found[:, 0].astype(np.int64) * cells + found[:, 1]) for found in (pairs, undecided))
     spent = tests.numpy()[:, list(octants)]
     return FloodAnswers(
         pairs[order],
         line[order],
         offset[order],
-        reached.numpy() == Verdict.UNKNOWN,
+        undecided[left],
         (spent >= 0).all(axis=1),
         int(np.maximum(spent, 0).sum()),
     )

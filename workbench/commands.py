@@ -18,6 +18,7 @@ from .terminal import FAILED, INTERRUPTED, complain, say
 
 if TYPE_CHECKING:
     from ..data.scene import Scene
+    from .baked import Bake
 
 
 def make_office(options: argparse.Namespace) -> int:
@@ -364,22 +365,39 @@ def bench(options: argparse.Namespace) -> int:
 
 
 def curves(options: argparse.Namespace) -> int:
-    """Sweep the knobs, draw the curves and say which settings are worth their time."""
+    """Sweep the knobs, draw the curves and say which settings are worth their time, and what random eyes miss."""
     from .baked import load
-    from .curves.plot import curve_lines, write_curves
-    from .curves.sweep import sweep
 
     if options.stability == (options.bake is not None):
         raise InputError("curves: expected a bake folder or --stability, found both or neither")
     if options.stability:
         return _stability(options)
     made = load(options.bake)
-    found = sweep(made, cells=options.cells, seed=options.seed)
-    folder = Path(options.out) if options.out else Path(made.folder) / "report"
-    write_curves(found, folder)
-    say(curve_lines(found))
+    folder, wrong = Path(options.out) if options.out else Path(made.folder) / "report", False
+    if not options.eyes:
+        from .curves.plot import curve_lines, write_curves
+        from .curves.sweep import sweep
+
+        found = sweep(made, cells=options.cells, seed=options.seed)
+        write_curves(found, folder)
+        say(curve_lines(found))
+        wrong = any(p.wrong_hidden for one in found.safe for p in one.points)
+    if options.eyes or made.scene is not None:
+        wrong |= _eyes(made, folder, options)
     say(f"written to {folder}")
-    return FAILED if any(p.wrong_hidden for one in found.safe for p in one.points) else 0
+    return FAILED if wrong else 0
+
+
+def _eyes(made: "Bake", folder: Path, options: argparse.Namespace) -> bool:
+    """What random eyes miss; whether the bake hides something that they see."""
+    from .curves.eyes import eyes_lines, eyes_missed, write_eyes
+
+    found = eyes_missed(made, cells=options.cells, pixels=options.pixels, seed=options.seed)
+    write_eyes(found, folder)
+    say(eyes_lines(found))
+    if found.wrong_hidden:
+        print(f"viewcell: {found.pair} hidden although seen (case file {found.case}); this is a bug", file=sys.stderr)
+    return bool(found.wrong_hidden)
 
 
 def _stability(options: argparse.Namespace) -> int:

@@ -216,7 +216,7 @@ def _cast_all(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, resul
     total = -(-rays // rows)
     # The first batch is one ray a cell: it compiles the kernels, outside the clock and on one thread.
     start = time.perf_counter()
-    if _judge_batch(bake, sources, judge, caster.cast(0, 1), result):
+    if judge_batch(bake, sources, judge, caster.cast(0, 1), result):
         result.rays, result.cell_rays = rows, caster.cell_rays(1)
         return
     result.seconds["compile"] = time.perf_counter() - start
@@ -227,7 +227,7 @@ def _cast_all(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, resul
             for (_, run), found in zip(block, pool.map(lambda batch: caster.cast(*batch), block), strict=True):
                 done += run
                 bar.update(rows * run)
-                if _judge_batch(bake, sources, judge, found, result):
+                if judge_batch(bake, sources, judge, found, result):
                     pool.shutdown(cancel_futures=True)
                     break
             seconds = time.perf_counter() - start
@@ -271,15 +271,13 @@ def _hunt(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, result: V
         for found, state in falsifier.batches(rays):
             bar.reach(state.rays)
             result.guided_rays = state.rays
-            if _judge_batch(bake, sources, judge, found, result):
+            if judge_batch(bake, sources, judge, found, result):
                 break
     result.random_rays = falsifier.uniform_rays
     result.seconds["guided rays"] = time.perf_counter() - start
 
 
-def _judge_batch(
-    bake: "BakeFolder", sources: np.ndarray, judge: Judge, found: Candidates, result: VerifyResult
-) -> bool:
+def judge_batch(bake: "BakeFolder", sources: np.ndarray, judge: Judge, found: Candidates, result: VerifyResult) -> bool:
     """Count a batch's candidates; write the case file of the first wrong-hidden and say True."""
     for number in range(len(found.rows)):
         cell, kind = int(sources[found.rows[number]]), KINDS[found.kinds[number]]

@@ -26,6 +26,8 @@ AIM_ROUNDS = (16, 64, 256)
 REFUSED_AGAIN = 3
 # Lines tried for a group of cells, and where the groups start: the root is visible from everywhere.
 GROUP_CAP, FIRST_LEVEL = 40, 3
+# Moves of a line that are tried together.
+JITTERS = 64
 # A cell sees itself if a sightline of this length fits into it [grid steps].
 SHORT = np.array([1.0 / 1024.0, 0.0, 0.0])
 
@@ -146,33 +148,50 @@ def cell_rows(
 
 
 def portal_rows(model: CellModel, sources: np.ndarray, rows: Rows) -> Rows:
-    """Rows of a bare graph from its lines; a line that float64 cannot follow through the portals is no witness."""
+    """Rows of a bare graph from lines found from one end or both; what a source sees, and is one itself, sees it.
+
+    A line that float64 cannot follow through the portals is no witness. It can be followed either way, so one witness
+    serves both ends.
+    """
+    count, chosen = model.graph.cell_count, np.zeros(model.graph.cell_count, bool)
+    chosen[sources] = True
+    turned = chosen[rows.target] & (rows.source > rows.target)
+    rows.source[turned], rows.target[turned] = rows.target[turned], rows.source[turned]
+    rows.origin[turned], rows.end[turned] = rows.end[turned], rows.origin[turned]
     good = np.flatnonzero(accept(model, rows.source, rows.target, rows.origin, rows.end))
     rows.show(good, rows.origin[good], rows.end[good])
-    _jitter(model, rows)
-    # A pair may have been found from both of its ends: the one with a witness stays.
-    rows = rows.take(np.lexsort((~rows.seen, rows.target, rows.source)))
-    key = rows.source * model.graph.cell_count + rows.target
-    return _with_own(model, sources, rows.take(np.diff(key, prepend=-1) != 0))
+    # A pair may have been found from both of its ends: one with a witness stays.
+    key = 2 * (rows.source * count + rows.target) + ~rows.seen
+    order = np.argsort(key)
+    first = np.diff(key[order] // 2, prepend=-1) != 0
+    best, pair = order[first], np.cumsum(first) - 1
+    open_ = np.flatnonzero(~rows.seen[best][pair])
+    _jitter(model, rows, order[open_])
+    open_ = open_[rows.seen[order[open_]]]
+    best[pair[open_]] = order[open_]
+    there = rows.take(best)
+    both = there.take(chosen[there.target])
+    back = Rows(both.target, both.source, both.verdict, both.end, both.origin)
+    return _with_own(model, sources, Rows.join([there, back]))
 
 
-def _jitter(model: CellModel, rows: Rows) -> None:
-    """Move lines that run along a seam between portals, less and less; shows what comes of it, in place."""
+def _jitter(model: CellModel, rows: Rows, todo: np.ndarray) -> None:
+    """Move those lines of some rows that run along a seam between portals, less and less; shows them, in place."""
     cells = model.graph.cells.astype(float)
     random = np.random.default_rng(model.seed)
-    todo = np.flatnonzero(~rows.seen)
     todo = todo[(rows.origin[todo] != rows.end[todo]).any(axis=1)]
-    for power in np.repeat(np.arange(2, 14, 2), 8):
+    for power in range(2, 14, 2):
         todo = todo[~rows.seen[todo]]
         if not len(todo):
             return
-        source, target = rows.source[todo], rows.target[todo]
+        tried = np.tile(todo, JITTERS)
+        source, target = rows.source[tried], rows.target[tried]
         moved = []
-        for point, cell in ((rows.origin[todo], cells[source]), (rows.end[todo], cells[target])):
+        for point, cell in ((rows.origin[tried], cells[source]), (rows.end[tried], cells[target])):
             reach = (cell[:, 1] - cell[:, 0]) * 0.5**power
             moved.append(on_witness_grid(point + random.uniform(-1.0, 1.0, point.shape) * reach))
-        good = accept(model, source, target, *moved)
-        rows.show(todo[good], moved[0][good], moved[1][good])
+        good = np.flatnonzero(accept(model, source, target, *moved))
+        rows.show(tried[good], moved[0][good], moved[1][good])
 
 
 def join_cell_rows(model: CellModel, parts: list[Rows]) -> Rows:

@@ -8,7 +8,7 @@ from ...data.graph import CellGraph
 from ...data.rows import Rows
 from ...data.verdict import Verdict
 from ...kernels import flood, line_tree, target, trace
-from ...kernels.flood import launch_flood
+from ...kernels.flood import FloodAnswers, launch_flood
 from ...kernels.launch import CPU, Device
 from ...kernels.target import TargetAnswers
 from .cells import CellModel, certified_pairs, join_cell_rows, portal_rows, search_pairs
@@ -18,6 +18,8 @@ from .search import segments
 
 # A flood is tried on this many sources first; where more than a quarter run into the cap, sequences explode.
 SAMPLE = 24
+# Those that the cap cuts off may take so many times more, if that is enough for most of them.
+AGAIN = 16
 NO_OBJECTS = Rows.unseen(np.zeros(0, int), np.zeros(0, int))
 
 
@@ -76,30 +78,55 @@ class GraphEngine:
     def _flood(self, sources: np.ndarray) -> Rows:
         """Portal sequences where they end soon, the target search for the rest."""
         model, count = self.model, self.model.graph.cell_count
-        options = {"cap": 400 + count // 2, "device": model.device}
+        cap = 400 + count // 2
         # A line can be followed either way, so when every cell is a source, half the octants find every pair.
         octants = (0, 2, 4, 6) if len(sources) == count else tuple(range(8))
-        sample = sources[:: max(1, len(sources) // SAMPLE)]
-        explodes = launch_flood(model.device_graph, sample, octants, **options).complete.mean() < 0.75
-        verdict = np.full((len(sources), count), Verdict.UNKNOWN, np.uint8)
-        verdict[np.arange(len(sources)), sources] = Verdict.VISIBLE
-        lines = []
-        if not explodes:
-            found = launch_flood(model.device_graph, sources, octants, **options)
-            row, cell = found.pairs[:, 0], found.pairs[:, 1]
-            answers = TargetAnswers(None, None, found.pairs[:, 2], found.line, found.offset)
-            lines.append(self._lines(answers, np.arange(len(row)), np.column_stack([sources[row], cell])))
-            verdict[found.complete] = Verdict.HIDDEN
-            verdict[found.undecided] = Verdict.UNKNOWN
-            verdict[row, cell] = Verdict.VISIBLE
-            row_of = self._row_of(sources)
-            both = row_of[cell] >= 0
-            verdict[row_of[cell[both]], sources[row[both]]] = Verdict.VISIBLE
-            if len(octants) == 4:
-                # Half the octants prove a pair hidden only together with the other end's half.
-                verdict[(verdict == Verdict.HIDDEN) & (verdict.T == Verdict.UNKNOWN)] = Verdict.UNKNOWN
-        todo = np.argwhere(verdict == Verdict.UNKNOWN)
-        return self._search(sources, np.column_stack([sources[todo[:, 0]], todo[:, 1]]), lines)
+        if self._explode(sources, octants, cap):
+            row, cell = np.divmod(np.arange(len(sources) * count), count)
+            pairs = np.column_stack([sources[row], cell])
+            return self._search(sources, pairs[pairs[:, 0] != pairs[:, 1]], [])
+        found = launch_flood(model.device_graph, sources, octants, cap=cap, device=model.device)
+        cut = np.flatnonzero(~found.complete)
+        # A few that see far need more; searching for each of their targets takes longer still.
+        if len(cut) and not self._explode(sources[cut], octants, AGAIN * cap):
+            more = launch_flood(model.device_graph, sources[cut], octants, cap=AGAIN * cap, device=model.device)
+            found = found.replaced(cut, more)
+        pairs = np.column_stack([sources[found.pairs[:, 0]], found.pairs[:, 1]])
+        answers = TargetAnswers(None, None, found.pairs[:, 2], found.line, found.offset)
+        lines = self._lines(answers, np.arange(len(pairs)), pairs)
+        return self._search(sources, self._left(found, sources, len(octants) == 4), [lines])
+
+    def _explode(self, sources: np.ndarray, octants: tuple[int, ...], cap: int) -> bool:
+        """Whether, of some of the sources, more than a quarter run into the cap."""
+        sample, model = sources[:: max(1, len(sources) // SAMPLE)], self.model
+        return launch_flood(model.device_graph, sample, octants, cap=cap, device=model.device).complete.mean() < 0.75
+
+    def _left(self, found: FloodAnswers, sources: np.ndarray, halved: bool) -> np.ndarray:
+        """(source, cell) pairs that a flood neither sees nor proves hidden, shape (n, 2), ordered.
+
+        Args:
+            found: by the flood.
+            sources: that it started from.
+            halved: it searched half the octants, from every cell.
+        """
+        count, row_of = self.model.graph.cell_count, self._row_of(sources)
+
+        def keys(row: np.ndarray, cell: np.ndarray) -> np.ndarray:
+            """Of pairs, and of those seen the other way, which are of other rows."""
+            back = row_of[cell] >= 0
+            there = np.asarray(row, np.int64) * count + cell
+            return np.concatenate([there, row_of[cell[back]] * count + sources[row[back]]])
+
+        cut, (row, cell) = np.flatnonzero(~found.complete), found.undecided.T
+        left = np.concatenate([(cut[:, None] * count + np.arange(count)).ravel(), row.astype(np.int64) * count + cell])
+        if halved:
+            # Half the octants prove a pair hidden only together with the other end's half.
+            left = keys(*np.divmod(left, count))
+        if len(left):
+            own = np.arange(len(sources)) * count + sources
+            left = np.setdiff1d(left, np.concatenate([keys(found.pairs[:, 0], found.pairs[:, 1]), own]))
+        row, cell = np.divmod(left, count)
+        return np.column_stack([sources[row], cell])
 
     def _row_of(self, sources: np.ndarray) -> np.ndarray:
         """Place of each cell among the sources, -1 if it is none."""
@@ -115,9 +142,7 @@ class GraphEngine:
         kept = np.flatnonzero(answers.verdict == Verdict.VISIBLE)
         doubtful = pairs[answers.verdict == Verdict.UNKNOWN]
         there = Rows.join([*lines, self._lines(answers, kept, pairs[kept]), Rows.unseen(*doubtful.T)])
-        both = there.take(row_of[there.target] >= 0)
-        back = Rows(both.target, both.source, both.verdict, both.end, both.origin)
-        return portal_rows(self.model, sources, Rows.join([there, back]))
+        return portal_rows(self.model, sources, there)
 
     def _lines(self, answers: TargetAnswers, rows: np.ndarray, pairs: np.ndarray) -> Rows:
         """Pairs with the ends of their lines, which are not witnesses yet."""

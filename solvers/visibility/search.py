@@ -52,12 +52,13 @@ def segments(
         Origins and ends [grid steps], shape (n, 3), float64, multiples of 2**-10.
     """
     w, xi = answers.line[rows], answers.offset[rows]
-    sign = np.where((answers.octant[rows][:, None] >> np.arange(3)) & 1, -1.0, 1.0)
+    forward = (answers.octant[rows][:, None] >> np.arange(3)) & 1 == 0
+    sign = np.where(forward, 1.0, -1.0)
 
     def times(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        ends = boxes.astype(float) * sign[:, None]
-        ends = np.stack([ends.min(axis=1), ends.max(axis=1)], axis=1)
-        low, high = w * ends[:, 0] - xi, w * ends[:, 1] - xi
+        # Mirrored where the octant is negative. Column by column: NumPy is many times slower along short axes.
+        low, high = (np.where(forward, boxes[:, k], -boxes[:, 1 - k].astype(np.int64)) for k in (0, 1))
+        low, high = w * low - xi, w * high - xi
         return np.maximum.reduce(low.T), np.minimum.reduce(high.T)
 
     def place(time: np.ndarray) -> np.ndarray:

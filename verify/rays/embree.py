@@ -6,6 +6,7 @@ for exact adjudication.
 
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +22,9 @@ wp.set_module_options({"enable_backward": False})
 CANDIDATE_CAPACITY = 4096
 # One ray in this many is also cast at the transparent triangles.
 GLASS_SHARE = 8
+# Sheets of glass that a ray is followed through, and the step past each [grid steps].
+LAYERS = 16
+PAST_GLASS = 0.25
 # Steps of Roberts' R2 sequence.
 R2 = np.array([0.7548776662466927, 0.5698402909980532])
 # Of five rounds through a cell's origins three are stratified. Only the first three are followed through the cells:
@@ -265,6 +269,36 @@ def embree_scene(triangles: np.ndarray) -> EmbreeScene | None:
     # The first ray commits the scene, which must not happen on two threads at once.
     scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
     return scene
+
+
+def through_glass(
+    glass: EmbreeScene | None, origins: np.ndarray, directions: np.ndarray, reach: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Sheets of glass that rays pass before they are stopped, one sheet after the other, at most 16.
+
+    Args:
+        glass: the transparent triangles; None if there are none.
+        origins: [grid steps], shape (n, 3), float32.
+        directions: unit length, shape (n, 3), float32.
+        reach: parameter where each ray is stopped, infinity if it is not, shape (n,), float32.
+
+    Yields:
+        Rays (places in the arrays), the triangle that each meets, and the parameter where it does.
+    """
+    rays, passed = np.arange(len(origins)), np.zeros(len(origins), np.float32)
+    for _ in range(LAYERS if glass is not None else 0):
+        starts = origins[rays] + passed[:, None] * directions[rays]
+        limits = np.minimum(reach[rays] - passed, np.float32(1e30))
+        rays, starts, limits, passed = (column[limits > 0] for column in (rays, starts, limits, passed))
+        # Embree overwrites the limits.
+        found = glass.run(starts, directions[rays], dists=limits.copy(), output=1)
+        hit = np.flatnonzero(found["primID"] >= 0)
+        if not len(hit):
+            return
+        rays, passed = rays[hit], passed[hit] + found["tfar"][hit]
+        yield rays, found["primID"][hit], passed
+        # A step in float32, whose spacing is 2**-23 of the coordinate.
+        passed = passed + np.float32(PAST_GLASS) + np.abs(starts[hit]).max(axis=1) * np.float32(2**-20)
 
 
 def _share(array: np.ndarray, dtype: type | None = None) -> wp.array:

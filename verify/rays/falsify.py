@@ -15,7 +15,7 @@ from ...data.errors import InputError
 from ...data.plans import NO_PLANS, Plans
 from ..exact.sightline import Sightlines
 from .crossing import Crossings
-from .embree import Candidates, embree_scene
+from .embree import Candidates, embree_scene, through_glass
 from .free_space import FreeSpace, all_axes
 from .guide import SHORT, STRATEGIES, Aimed, Guide, Hints, Lesson, length, slab
 from .targets import Targets
@@ -32,9 +32,6 @@ THREADS = 2
 ATTEMPTS = 16
 # Pairs of view cell and target above which their weights are brought up to date only after as many rays.
 MANY_PAIRS = 1 << 18
-# Sheets of glass that a ray is followed through, and the step past each [grid steps].
-LAYERS = 16
-PAST_GLASS = 0.25
 
 
 @dataclass(frozen=True)
@@ -239,20 +236,8 @@ class Falsifier:
         self, origins: np.ndarray, directions: np.ndarray, reach: np.ndarray
     ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Rays, transparent objects that they pass before they are stopped, and where; one sheet after the other."""
-        rays, passed = np.arange(len(origins)), np.zeros(len(origins), np.float32)
-        for _ in range(LAYERS if self._glass_scene is not None else 0):
-            starts = origins[rays] + passed[:, None] * directions[rays]
-            limits = np.minimum(reach[rays] - passed, np.float32(1e30))
-            rays, starts, limits, passed = (column[limits > 0] for column in (rays, starts, limits, passed))
-            # Embree overwrites the limits.
-            found = self._glass_scene.run(starts, directions[rays], dists=limits.copy(), output=1)
-            hit = np.flatnonzero(found["primID"] >= 0)
-            if not len(hit):
-                return
-            rays, passed = rays[hit], passed[hit] + found["tfar"][hit]
-            yield rays, self._glass_owners[found["primID"][hit]], passed
-            # A step in float32, whose spacing is 2**-23 of the coordinate.
-            passed = passed + np.float32(PAST_GLASS) + np.abs(starts[hit]).max(axis=1) * np.float32(2**-20)
+        for rays, triangles, passed in through_glass(self._glass_scene, origins, directions, reach):
+            yield rays, self._glass_owners[triangles], passed
 
 
 def scaled_shares(shares: Mapping[str, float], hinted: bool) -> dict[str, float]:

@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,8 +23,9 @@ from ...data.buildings.office import make_office
 from ...data.readers import read
 from ...data.store.bake_folder import read_bake
 from ...verify.rays.adjudicate import Judge, Judgement, sightline_end
-from ...verify.rays.embree import Candidates, Caster, embree_scene
+from ...verify.rays.embree import Candidates, Caster
 from ...verify.rays.falsify import SHARES, Falsifier
+from ...verify.rays.solid_angles import SAMPLES, SolidAngles
 from ...verify.rays.starts import ORIGINS_MOST, cell_origins
 from ...verify.rays.witness import visible_rows
 from ..bake.run import bake
@@ -37,11 +37,7 @@ if TYPE_CHECKING:
 
 # Decades of solid angle [powers of 10 sr]; the last is open.
 DECADES = (-8, -7, -6, -5, -4, -3, -2)
-# Samples a pair in turn, as long as the relative error of its solid angle is above the wanted one; above the last it
-# is dropped.
-SAMPLES = ((1 << 11, 0.3), (1 << 14, 0.3), (1 << 17, 0.5))
-# Samples cast together, and pairs that are graded at most.
-CHUNK = 1 << 18
+# Pairs that are graded at most.
 PAIRS = 8000
 MARKS = (10**5, 10**6, 10**7)
 WANTED = 0.9
@@ -88,11 +84,7 @@ def prepare(made: "BakeFolder", seed: int) -> Setting:
 
 
 def graded_pairs(setting: Setting, seed: int) -> tuple[Omissions, int]:
-    """Opaque objects with a witness, their solid angles, and how many were dropped as too uncertain.
-
-    The solid angle is the mean of A cos(a) / r**2 over pairs of a free point and a point uniform on the object's
-    area A, r apart, with the angle a to the normal, where Embree's first hit is that point.
-    """
+    """Opaque objects with a witness, their solid angles, and how many were dropped as too uncertain."""
     rng, lines = np.random.default_rng(seed), setting.judge.lines
     row_of = np.full(setting.bake.graph.cell_count, -1)
     row_of[setting.sources] = np.arange(len(setting.sources))
@@ -101,62 +93,9 @@ def graded_pairs(setting: Setting, seed: int) -> tuple[Omissions, int]:
     kept = np.flatnonzero((rows >= 0) & np.isin(objects, lines.owners))
     kept = np.sort(rng.permutation(kept)[:PAIRS])
     rows, objects = rows[kept], objects[kept]
-    sums, squares, counts = np.zeros((3, len(rows)))
-    estimate, left = SolidAngles(setting), np.arange(len(rows))
-    for count, wanted in SAMPLES:
-        parts = np.array_split(left, max(1, -(-len(left) * count // CHUNK)))
-        works = [partial(estimate, rows[part], objects[part], count) for part in parts]
-        with ThreadPoolExecutor(THREADS) as pool:
-            results = pool.map(lambda work, own: work(own), works, rng.spawn(len(parts)))
-            for part, (total, square) in zip(parts, results, strict=True):
-                sums[part] += total
-                squares[part] += square
-                counts[part] += count
-        mean = sums / counts
-        with np.errstate(divide="ignore", invalid="ignore"):
-            error = np.sqrt(np.maximum(squares / counts - mean**2, 0) / counts) / mean
-        left = np.flatnonzero(~(error <= wanted))
-    sure = np.setdiff1d(np.arange(len(rows)), left)
-    return Omissions(rows[sure], objects[sure], mean[sure]), len(left)
-
-
-class SolidAngles:
-    """Sums and sums of squares of the estimates of `graded_pairs`."""
-
-    def __init__(self, setting: Setting):
-        """Take the scene."""
-        lines = setting.judge.lines
-        self.corners, self.owners = lines.triangles.astype(np.float64), lines.owners
-        sides = self.corners[:, 1:] - self.corners[:, :1]
-        normals = np.cross(sides[:, 0], sides[:, 1])
-        areas = np.linalg.norm(normals, axis=1) / 2
-        self.normals, self.total = normals / (2 * areas[:, None]), np.concatenate([[0], np.cumsum(areas)])
-        self.starts = np.searchsorted(self.owners, np.arange(len(setting.bake.scene.objects) + 1))
-        self.scene = embree_scene(lines.triangles)
-        self.spots, self.counts = np.concatenate(setting.spots), np.array([len(own) for own in setting.spots])
-        self.first = np.cumsum(self.counts) - self.counts
-
-    def __call__(
-        self, rows: np.ndarray, objects: np.ndarray, count: int, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Sums over `count` samples of each pair."""
-        row, chosen = np.repeat(rows, count), np.repeat(objects, count)
-        origins = self.spots[self.first[row] + rng.integers(0, self.counts[row])].astype(np.float64)
-        low, high = self.total[self.starts[chosen]], self.total[self.starts[chosen + 1]]
-        place = low + rng.random(len(row)) * (high - low)
-        triangles = np.clip(
-            np.searchsorted(self.total, place, "right") - 1, self.starts[chosen], self.starts[chosen + 1] - 1
-        )
-        points = np.einsum("nc,nca->na", rng.dirichlet((1.0, 1.0, 1.0), len(row)), self.corners[triangles])
-        along = points - origins
-        distance = np.linalg.norm(along, axis=1)
-        along /= distance[:, None]
-        found = self.scene.run(origins.astype(np.float32), along.astype(np.float32), output=1)
-        seen = (found["primID"] >= 0) & (self.owners[found["primID"]] == chosen)
-        seen &= np.abs(found["tfar"] - distance) < 1e-4 * distance + 0.5
-        cosine = np.abs((along * self.normals[triangles]).sum(axis=1))
-        value = np.where(seen, (high - low) * cosine / distance**2, 0.0).reshape(-1, count)
-        return value.sum(axis=1), (value**2).sum(axis=1)
+    mean, error = SolidAngles(lines, len(setting.bake.scene.objects), setting.spots).graded(rows, objects, rng)
+    sure = np.flatnonzero(error <= SAMPLES[-1][1])
+    return Omissions(rows[sure], objects[sure], mean[sure]), len(rows) - len(sure)
 
 
 def decade(solid_angles: np.ndarray) -> np.ndarray:

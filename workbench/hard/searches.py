@@ -64,7 +64,8 @@ def flood(cases: HardCases, device: Device) -> Outcomes:
     for case in cases.graph:
         count = len(case.cells)
         found = launch_flood(_engine(case, device).model.device_graph, np.arange(count), cap=CAP, device=device)
-        verdict = np.where(found.undecided | ~found.complete[:, None], Verdict.UNKNOWN, Verdict.HIDDEN)
+        verdict = np.full((count, count), Verdict.HIDDEN)
+        verdict[~found.complete] = verdict[tuple(found.undecided.T)] = Verdict.UNKNOWN
         verdict[found.pairs[:, 0], found.pairs[:, 1]] = Verdict.VISIBLE
         pairs = [(a, b) for a in range(count) for b in range(count) if a != b]
         hidden = {(a, b): (min(a, b), max(a, b)) not in case.seen for a, b in pairs}

@@ -29,8 +29,8 @@ def add_curves(commands: argparse._SubParsersAction) -> None:
         commands,
         "curves",
         "curves",
-        "Sweep every method's knob over a bake: time against error.",
-        ["curves house.bake", "curves --stability -o stability"],
+        "Sweep every method's knob over a bake: time against error, and what random eyes miss.",
+        ["curves house.bake", "curves house.bake --eyes --pixels 128,512", "curves --stability -o stability"],
     )
     curves.add_argument("bake", metavar="BAKE", nargs="?", help="bake folder; not with --stability")
     curves.add_argument(
@@ -38,13 +38,21 @@ def add_curves(commands: argparse._SubParsersAction) -> None:
         action="store_true",
         help="instead, every kernel's error far from the origin, at slits, with thin occluders and close to edges",
     )
+    curves.add_argument("--eyes", action="store_true", help="only what unions of random eyes miss of what is seen")
+    curves.add_argument(
+        "--pixels",
+        type=ids,
+        metavar="N,N",
+        default=[128],
+        help="on a side of the faces of these eyes' cube maps; 128 by default",
+    )
     curves.add_argument("--device", default="cpu", help="of --stability, such as cuda:0; cpu by default")
     curves.add_argument("--cells", type=whole(1), default=8, help="view cells to sweep over; 8 by default")
     curves.add_argument(
         "-o",
         "--out",
         metavar="FOLDER",
-        help="folder for curves.json and .png; BAKE/report by default, where report finds them",
+        help="folder for curves and eyes, .json and .png; BAKE/report by default, where report finds them",
     )
     add_seed(curves, "the view cells and what the methods draw")
 

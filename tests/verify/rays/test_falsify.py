@@ -458,37 +458,6 @@ def test_hints_of_a_certified_bake(tmp_path):
     assert set(certificate_hints(made, np.array([0])).rows) == {0}
 
 
-def in_the_middle(house):
-    """The house seen from the middle of each view cell alone, where nothing is near."""
-    boxes = house.boxes[house.sources].astype(float)
-    return bench.Setting(house.made, house.judge, house.sources, list(boxes.mean(axis=1)[:, None].astype(np.float32)))
-
-
-def test_solid_angles_of_a_closed_room_fill_the_sphere(house):
-    """The graded solid angles of all that is seen from a point sum to 4 pi, as closely as they say."""
-    estimate, count, objects = bench.SolidAngles(in_the_middle(house)), 30_000, np.arange(PANE)
-    for row in range(len(house.sources)):
-        sums, squares = estimate(np.full(len(objects), row), objects, count, np.random.default_rng(0))
-        error = math.sqrt((squares / count - (sums / count) ** 2).sum() / count)
-        assert error < 0.02 * 4 * math.pi
-        assert abs(sums.sum() / count - 4 * math.pi) < 4 * error
-
-
-def test_the_solid_angle_of_a_desk_is_that_of_its_outline(house):
-    """Half the solid angles of its sides, whichever way they face: a line meets a box that it meets twice."""
-    row, count = list(house.sources).index(2), 200_000
-    sums, squares = bench.SolidAngles(in_the_middle(house))(
-        np.array([row]), np.array([DESK]), count, np.random.default_rng(1)
-    )
-    error = math.sqrt((squares[0] / count - (sums[0] / count) ** 2) / count)
-    triangles, owners = house.made.scene.triangles()
-    a, b, c = (triangles[owners == DESK].astype(float) - house.boxes[2].mean(axis=0)).transpose(1, 0, 2)
-    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
-    bottom = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
-    exact = np.abs(2 * np.arctan2((a * np.cross(b, c)).sum(axis=1), bottom)).sum() / 2
-    assert error < 0.01 * exact and abs(sums[0] / count - exact) < 4 * error
-
-
 def test_expected_uniform_rays():
     """One hole of 1e-3 sr in one of 7 view cells: a share is found as the geometric law says."""
     planted = bench.Omissions(np.array([0]), np.array([0]), np.array([1e-3]))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
+from viewcell.verify.rays import solid_angles, unions
 from viewcell.workbench.bake.run import bake
 from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.baked import load
@@ -30,11 +31,13 @@ def quick(monkeypatch):
     small = {"THRESHOLDS_M2": (0.0,), "SPLITS": (2,), "SIDES_M": (1.0,), "SHARES": (0.2,), "RESOLUTIONS": (32,)}
     for name, values in (small | {"CLUSTERS": (1,), "RAYS": (100, 10_000), "GRAPH_RAYS": (10, 1_000)}).items():
         monkeypatch.setattr(sweeps, name, values)
+    monkeypatch.setattr(unions, "FRAME_PIXELS", 32)
+    monkeypatch.setattr(solid_angles, "SAMPLES", ((1 << 9, 0.3),))
 
 
 @pytest.mark.slow
 def test_every_knob_of_a_model_is_swept(baked, quick, tmp_path, capsys):
-    assert main(["curves", str(baked), "--cells", "2", "--out", str(tmp_path), "--no-progress"]) == 0
+    assert main(["curves", str(baked), "--cells", "2", "--pixels", "8", "--out", str(tmp_path), "--no-progress"]) == 0
     said = capsys.readouterr().out
     found = read_curves(tmp_path / "curves.json")
     methods = {(one.method, one.knob): one for one in found.series}
@@ -55,6 +58,7 @@ def test_every_knob_of_a_model_is_swept(baked, quick, tmp_path, capsys):
     assert few.error < many.error < 1 and few.wrong_hidden > many.wrong_hidden > 0
     shares = [p.error for p in methods["levels of detail", "pixels"].points]
     assert shares == sorted(shares, reverse=True) and shares[-1] < 1
+    assert "union of 125 random eyes" in said and (tmp_path / "eyes.json").exists()
     assert "sampling alone, rays per cell" in said and (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
     assert "NaN" not in (tmp_path / "curves.json").read_text()
 
@@ -81,7 +85,8 @@ def test_a_method_that_hides_what_is_seen_fails(baked, quick, tmp_path, monkeypa
     monkeypatch.setattr(sweeps, "bake", hiding)
     for name in ("THRESHOLDS_M2", "SPLITS", "SIDES_M", "SHARES", "CLUSTERS"):
         monkeypatch.setattr(sweeps, name, ())
-    assert main(["curves", str(baked), "--cells", "1", "--out", str(tmp_path), "--no-progress"]) == 1
+    few = ["--cells", "1", "--pixels", "8"]
+    assert main(["curves", str(baked), *few, "--out", str(tmp_path), "--no-progress"]) == 1
 
 
 def test_rays_see_no_more_than_is_potential_and_leave_the_bake_alone(baked):
