@@ -7,6 +7,7 @@ the true surface, so nothing is ever called blocked that is not. What cuts cells
 axial boxes around small oblique parts of upright outlines, such as arches, whose openings then are rectangles.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -77,31 +78,65 @@ class OpaquePlanes:
 NO_PLANES = OpaquePlanes([np.zeros((0, 2, 3), np.int32)] * 3, 0.0, 0.0)
 
 
-def opaque_planes(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS, carve_area: float = 0.0) -> OpaquePlanes:
+def opaque_planes(triangles: np.ndarray, oblique_steps: int = OBLIQUE_STEPS) -> OpaquePlanes:
     """Opaque rectangles of the axial triangles among `triangles`.
 
     Args:
         triangles: of opaque objects [grid steps], shape (m, 3, 3), int32.
         oblique_steps: most steps of the staircase along an oblique outline; 1 for none.
-        carve_area: as in `edge_rectangles`, of upright planes; levels are never carved.
     """
-    boxes, area, lost = [], 0.0, 0.0
+    found = _Found()
+    for axis, k, edges in _outlines(triangles):
+        found.add(axis, k, edge_rectangles(edges, oblique_steps))
+    return found.planes()
+
+
+def carved_planes(triangles: np.ndarray, carve_area: float) -> tuple[OpaquePlanes, OpaquePlanes]:
+    """As `opaque_planes`, and the same with oblique details of upright planes carved out; levels are never carved.
+
+    Args:
+        triangles: as of `opaque_planes`.
+        carve_area: as of `edge_rectangles`.
+    """
+    plain, carved = _Found(), _Found()
+    for axis, k, edges in _outlines(triangles):
+        part = edge_rectangles(edges)
+        plain.add(axis, k, part)
+        if axis < 2 and (edges[:, 0] != edges[:, 1]).all(axis=1).any():
+            part = edge_rectangles(edges, carve_area=carve_area)
+        carved.add(axis, k, part)
+    return plain.planes(), carved.planes()
+
+
+def _outlines(triangles: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
+    """Axis, coordinate and outline of every plane that holds axial triangles, ordered."""
     for axis in range(3):
-        flat = np.ptp(triangles[:, :, axis], axis=1) == 0
-        chosen = triangles[flat]
+        chosen = triangles[np.ptp(triangles[:, :, axis], axis=1) == 0]
         planes = np.unique(chosen[:, 0, axis])
         order = np.argsort(chosen[:, 0, axis], kind="stable")
         ends = np.searchsorted(chosen[order, 0, axis], planes, side="right")
-        begin, found = 0, [np.zeros((0, 2, 3), np.int32)]
-        for k, end in zip(planes, ends, strict=True):
-            corners = chosen[order[begin:end]][:, :, OTHER_AXES[axis]]
-            rectangles, kept, dropped = plane_rectangles(corners, oblique_steps, carve_area if axis < 2 else 0.0)
-            begin, area, lost = end, area + kept + dropped, lost + dropped
-            flat_boxes = np.full((len(rectangles), 2, 3), k, np.int32)
-            flat_boxes[:, :, OTHER_AXES[axis]] = rectangles
-            found.append(flat_boxes)
-        boxes.append(np.concatenate(found))
-    return OpaquePlanes(boxes, area, lost)
+        for k, begin, end in zip(planes.tolist(), np.append(0, ends)[:-1], ends, strict=True):
+            yield axis, k, _outline(chosen[order[begin:end]][:, :, OTHER_AXES[axis]].astype(np.int64))
+
+
+class _Found:
+    """Rectangles of planes, on the way."""
+
+    def __init__(self) -> None:
+        self._boxes = [[np.zeros((0, 2, 3), np.int32)] for _ in range(3)]
+        self._kept, self._lost = 0.0, 0.0
+
+    def add(self, axis: int, k: int, part: tuple[np.ndarray, float, float]) -> None:
+        """Take what `edge_rectangles` has found on a plane."""
+        rectangles, kept, lost = part
+        boxes = np.full((len(rectangles), 2, 3), k, np.int32)
+        boxes[:, :, OTHER_AXES[axis]] = rectangles
+        self._boxes[axis].append(boxes)
+        self._kept, self._lost = self._kept + kept, self._lost + lost
+
+    def planes(self) -> OpaquePlanes:
+        """All of them."""
+        return OpaquePlanes([np.concatenate(parts) for parts in self._boxes], self._kept + self._lost, self._lost)
 
 
 def plane_rectangles(

@@ -14,7 +14,7 @@ from .curtains import find_curtains
 from .exposed import exposed_faces
 from .graph import CellGraph
 from .occludees import Occludees, find_occludees
-from .opaque import NO_PLANES, OpaquePlanes, opaque_planes
+from .opaque import NO_PLANES, OpaquePlanes, carved_planes, opaque_planes
 from .patches import Patches, find_patches, join_outlines, rectangle_outlines
 from .regions import Regions, find_regions
 from .room_cells import find_room_points
@@ -69,13 +69,17 @@ class PreparedModel:
     @cached_property
     def surfaces(self) -> OpaquePlanes:
         """Opaque rectangles of occluders, on faces and inside walls that are nearly axial."""
-        return with_sections(opaque_planes(self.scene.triangles(Role.OCCLUDER)[0]), self.sections)
+        return with_sections(self._faces[0], self.sections)
 
     @cached_property
     def planes(self) -> OpaquePlanes:
         """Those that cut cells: with oblique details carved out, so that arches leave rectangles open."""
-        carved = opaque_planes(self.scene.triangles(Role.OCCLUDER)[0], carve_area=CARVED_M2 / self.scene.grid_m**2)
-        return with_sections(carved, self.sections)
+        return with_sections(self._faces[1], self.sections)
+
+    @cached_property
+    def _faces(self) -> tuple[OpaquePlanes, OpaquePlanes]:
+        """Opaque rectangles of faces of occluders, and the same carved."""
+        return carved_planes(self.scene.triangles(Role.OCCLUDER)[0], CARVED_M2 / self.scene.grid_m**2)
 
     @cached_property
     def sections(self) -> list[np.ndarray]:

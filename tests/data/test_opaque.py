@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from viewcell.data.buildings.prisms import prism
 from viewcell.data.graph import OTHER_AXES
-from viewcell.data.opaque import decompose, opaque_planes, plane_rectangles
+from viewcell.data.opaque import carved_planes, decompose, opaque_planes, plane_rectangles
 
 
 def covered(triangles, points):
@@ -228,4 +228,8 @@ def test_levels_are_never_carved():
     for axis in range(3):
         triangles = np.zeros((len(flat), 3, 3), np.int32)
         triangles[:, :, OTHER_AXES[axis]] = flat
-        assert (len(opaque_planes(triangles, carve_area=2**20).boxes[axis]) == 4) == (axis < 2)
+        plain, carved = carved_planes(triangles, 2**20)
+        assert (len(carved.boxes[axis]) == 4) == (axis < 2) and len(plain.boxes[axis]) > 4
+        for mine, theirs in zip(plain.boxes, opaque_planes(triangles).boxes, strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+        assert plain.axial_area == carved.axial_area == opaque_planes(triangles).axial_area

@@ -40,7 +40,7 @@ def test_patches_name_their_triangles_among_all_of_their_object():
 
 def test_every_part_is_made_once(monkeypatch):
     made = []
-    for name in ("closed_elements", "opaque_planes", "find_regions", "find_patches", "find_occludees"):
+    for name in ("closed_elements", "opaque_planes", "carved_planes", "find_regions", "find_patches", "find_occludees"):
         work = getattr(prepared, name)
         monkeypatch.setattr(prepared, name, lambda *a, work=work, name=name, **k: (made.append(name), work(*a, **k))[1])
     model = PreparedModel(random_solids.random_solids(1))
@@ -56,7 +56,7 @@ def test_every_part_is_made_once(monkeypatch):
             model.occludees,
         )
     assert sorted(made) == sorted(
-        ["closed_elements", *["opaque_planes"] * 3, "find_regions", "find_patches", "find_occludees"]
+        ["closed_elements", "opaque_planes", "carved_planes", "find_regions", "find_patches", "find_occludees"]
     )
 
 
