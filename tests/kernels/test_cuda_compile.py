@@ -2,29 +2,13 @@ import importlib
 
 import pytest
 import warp as wp
+from viewcell.workbench.bench.occupancy import modules
 
-MODULES = (
-    "flood",
-    "target",
-    "line_tree",
-    "sightline",
-    "trace",
-    "shaft",
-    "stab_batch",
-    "coverage",
-    "occludee",
-    "backface",
-    "select",
-    "umbra",
-    "shrink",
-    "raster",
-    "deviation",
-)
 HOPPER = 90
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", MODULES)
+@pytest.mark.parametrize("name", modules())
 def test_kernels_compile_for_cuda_without_a_gpu(name, tmp_path, monkeypatch):
     """Whether CUDA takes what is written; optimising it, most of the time, finds no mistake in it."""
     monkeypatch.setattr(wp.config, "optimization_level", 1)
