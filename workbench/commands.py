@@ -90,9 +90,7 @@ def inspect(options: argparse.Namespace) -> int:
 
 def bake(options: argparse.Namespace) -> int:
     """Bake a model and print what came of it."""
-    from .bake.place import leftovers
-    from .bake.run import Interrupted, default_out
-    from .bake.run import bake as compute
+    from .bake.place import check_place, default_out, leftovers
     from .bake.settings import Settings
     from .bake.settings_file import SettingsFile, read_settings
 
@@ -105,6 +103,11 @@ def bake(options: argparse.Namespace) -> int:
     out = Path(options.out) if options.out else default_out(model)
     for folder in [] if options.json else leftovers(out.absolute().parent, out.name):
         say(f"unfinished: {folder.name}; the bake that it is of goes on from there, viewcell clean removes it")
+    check_place(out, settings, options.overwrite)
+    # What fails above does so at once: the rest takes a second to import.
+    from .bake.run import Interrupted
+    from .bake.run import bake as compute
+
     before = _stamp(out)
     try:
         made = compute(
@@ -258,7 +261,7 @@ def check(options: argparse.Namespace) -> int:
 
 def tune_bake(options: argparse.Namespace) -> int:
     """Try settings beside the default's on a model, print what came of it and write it down."""
-    from .bake.run import default_out
+    from .bake.place import default_out
     from .bake.settings import Settings
     from .tune.bake import tune_bake as tune
     from .tune.bake_words import tuning_text, write_tuning

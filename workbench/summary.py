@@ -3,7 +3,6 @@
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from ..data.carving import BANDS
 from ..data.plural import counted
 
 if TYPE_CHECKING:
@@ -79,6 +78,8 @@ def kept_rows(kept: dict) -> list[tuple[str, str]]:
 
 def wall_words() -> list[str]:
     """What the shares of `Faces.walls_m2` are of."""
+    from ..data.carving import BANDS
+
     near = [f"{low + 1} to {high} grid steps off" for low, high in pairwise(BANDS)]
     return ["exactly along an axis", *near, f"over {BANDS[-1]} off", "oblique or curved"]
 

@@ -13,28 +13,21 @@ from ...data.errors import InputError
 from ...data.progress import Phase
 from ...data.store.blocks import read_block, write_block
 from ...data.view_cells import as_graph, octants, walkable
-from .cells import Sources
-from .settings import CellSettings
 
 if TYPE_CHECKING:
     from ...kernels.launch import Device
     from ...solvers.visibility.engine import Engine, Part
+    from .cells import Sources
+    from .settings import CellSettings
 
 Item, Answer = TypeVar("Item"), TypeVar("Answer")
 
-# How the name of a folder of unfinished work ends.
-PARTIAL = ".partial"
 # Sources per block, which an interrupted bake resumes from.
 BLOCK = 24
 # View cells per block: their sets are larger.
 VIEW_BLOCK = 8
 # Threads take blocks: a model of few sources is cut into so many, of no fewer sources than this.
 BLOCKS, LEAST_BLOCK = 4, 3
-
-
-def partial_folder(out: Path, known: str) -> Path:
-    """Where unfinished work of the bake with a fingerprint is kept: beside its folder, and beside that of others."""
-    return out.with_name(f".{out.name}.{known[:16]}{PARTIAL}")
 
 
 class Store:
@@ -173,7 +166,7 @@ class Rate:
         return found
 
 
-def in_blocks(sources: Sources) -> list[np.ndarray]:
+def in_blocks(sources: "Sources") -> list[np.ndarray]:
     """Inhabitable cells in blocks; those of a bare graph are one.
 
     Cells of a block lie all over the model: blocks take about as long as each other, and the first tells of the rest.
@@ -185,7 +178,7 @@ def in_blocks(sources: Sources) -> list[np.ndarray]:
 
 
 def refine(
-    sources: Sources, work: Work, parts: "list[Part]", settings: CellSettings
+    sources: "Sources", work: Work, parts: "list[Part]", settings: "CellSettings"
 ) -> "tuple[list[Part], Shortfall | None]":
     """Replace cells of an octree that may see too much, or know too little, by their octants, level by level.
 
@@ -240,7 +233,7 @@ def _unrefined(work: Work, parts: "list[Part]", parents: np.ndarray, rate: Rate)
     return Shortfall("octree", len(parents), pairs, needed)
 
 
-def _too_coarse(part: "Part", count: int, sizes: np.ndarray, settings: CellSettings) -> np.ndarray:
+def _too_coarse(part: "Part", count: int, sizes: np.ndarray, settings: "CellSettings") -> np.ndarray:
     """Cells of a part that should be refined, shape (count,), bool; sizes are triangles by object."""
     rows = part.objects
     potential, unknown = (np.bincount(chosen, minlength=count) for chosen in (rows.source, rows.source[~rows.seen]))

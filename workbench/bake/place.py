@@ -9,14 +9,32 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from itertools import chain, count
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from filelock import FileLock, Timeout
 
 from ...data.errors import InputError
 from ...data.store.scene_folder import OLD, WRITING, held_manifest, refuse_others
 from ...data.version import __version__
-from .blocks import PARTIAL
 from .settings import Settings
+
+if TYPE_CHECKING:
+    from ...data.scene import Scene
+
+# How the name of a folder of unfinished work ends.
+PARTIAL = ".partial"
+
+
+def partial_folder(out: Path, known: str) -> Path:
+    """Where unfinished work of the bake with a fingerprint is kept: beside its folder, and beside that of others."""
+    return out.with_name(f".{out.name}.{known[:16]}{PARTIAL}")
+
+
+def default_out(model: "Scene | str | Path") -> Path:
+    """Where a bake goes that was not told where: named after its model, in the current folder."""
+    # `resolve` gives "." and ".." a name.
+    name = Path(model).resolve().stem or "model" if isinstance(model, str | Path) else "scene"
+    return Path(f"{name}.bake")
 
 
 def check_place(out: Path, settings: Settings, overwrite: bool) -> None:

@@ -26,11 +26,11 @@ from ...data.store.scene_folder import held_manifest
 from ...solvers.levels.pixel_error import pixel_levels
 from ..baked import Bake
 from . import blocks
-from .blocks import Shortfall, Store, Work, in_blocks, partial_folder, refine
+from .blocks import Shortfall, Store, Work, in_blocks, refine
 from .budget import within_budget
 from .cells import Sources, bare_sources, model_sources
 from .manifest import Clock, bake_manifest, fingerprint, rewrite_manifest
-from .place import alone, check_place, occupied, set_aside
+from .place import alone, check_place, default_out, occupied, partial_folder, set_aside
 from .settings import LevelSettings, Settings, SettingsWords, check_number, with_words
 from .worth import worth
 
@@ -167,13 +167,6 @@ def open_model(model: Scene | str | Path, settings: Settings) -> tuple[Scene | N
     from ...data.readers import read
 
     return warned(read(path, **settings.reading, **settings.frame)), None
-
-
-def default_out(model: Scene | str | Path) -> Path:
-    """Where a bake goes that was not told where: named after its model, in the current folder."""
-    # `resolve` gives "." and ".." a name.
-    name = "scene" if isinstance(model, Scene) else Path(model).resolve().stem or "model"
-    return Path(f"{name}.bake")
 
 
 def _detailed(scene: Scene, settings: Settings, run: _Run) -> tuple[Scene, dict]:
