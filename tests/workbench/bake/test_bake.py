@@ -181,7 +181,7 @@ def test_resuming_equals_never_stopping(lost, shell, shell_bake, tmp_path, monke
     with monkeypatch.context() as patch:
         stop_after(2, patch)
         with pytest.raises(Stopped):
-            viewcell.bake(shell, tmp_path / "shell")
+            viewcell.bake(shell, tmp_path / "shell", threads=1)
     assert not (tmp_path / "shell").exists()
     partial = next(tmp_path.iterdir())
     if lost == 0:
@@ -198,7 +198,7 @@ def test_blocks_of_another_size_are_not_taken_for_ours(shell, shell_bake, tmp_pa
     with monkeypatch.context() as patch:
         stop_after(2, patch)
         with pytest.raises(Stopped):
-            viewcell.bake(shell, tmp_path / "shell")
+            viewcell.bake(shell, tmp_path / "shell", threads=1)
     monkeypatch.setattr(blocks, "BLOCK", 5)
     assert same_tables(viewcell.bake(shell, tmp_path / "shell"), shell_bake)
 
