@@ -73,12 +73,14 @@ class Shortfall:
         cells: view cells that are not finished.
         pairs: pairs without a verdict from them: unknown, never hidden.
         needed_s: about how long visibility takes as a whole, from what was measured; None if nothing was.
+        minute: view cells that another minute would finish; likewise.
     """
 
     phase: str
     cells: int
     pairs: int
     needed_s: float | None
+    minute: int | None
 
 
 @dataclass
@@ -92,6 +94,7 @@ class Work:
         bar: how far it is, in cells.
         deadline: when no more is begun, of `time.perf_counter`.
         started: when it began, likewise.
+        objects: of the model.
     """
 
     engine: "Engine"
@@ -100,6 +103,11 @@ class Work:
     bar: Phase
     deadline: float = np.inf
     started: float = 0.0
+    objects: int = 0
+
+    def __post_init__(self) -> None:
+        """Nothing is finished yet."""
+        self._pairs = np.zeros(3, int)
 
     @property
     def width(self) -> int:
@@ -122,16 +130,38 @@ class Work:
         return self.engine.visible(block, aim=False)
 
     def finish_all(self, named: "list[tuple[int | str, np.ndarray]]") -> "list[Part]":
-        """Blocks as far as they go, side by side; counts their cells."""
-        return self.each(self.finish, named, [len(block) for _, block in named])
+        """Blocks as far as they go, side by side; counts their cells, and tells what is kept of the model."""
+        cells = [len(block) for _, block in named]
 
-    def each(self, do: "Callable[[Item], Answer]", work: "Sequence[Item]", cells: list[int]) -> "list[Answer]":
-        """What `do` returns for each piece of work, side by side, in order; counts so many cells for each."""
+        def tell(place: int, part: "Part") -> None:
+            self._pairs += cells[place] * self.objects, len(part.objects), int((~part.objects.seen).sum())
+            every, kept, unknown = self._pairs.tolist()
+            if kept:
+                self.bar.note = f"{kept / every:.0%} of the objects kept, {unknown / kept:.1%} of that unknown"
+
+        return self.each(self.finish, named, cells, tell)
+
+    def each(
+        self,
+        do: "Callable[[Item], Answer]",
+        work: "Sequence[Item]",
+        cells: list[int],
+        tell: "Callable[[int, Answer], None]" = lambda place, answer: None,
+    ) -> "list[Answer]":
+        """What `do` returns for each piece of work, side by side, in order.
+
+        Args:
+            do: what to do.
+            work: pieces of it.
+            cells: that each counts for when it is done.
+            tell: what to say then, given its place and answer.
+        """
         from ...kernels.launch import side_by_side
 
         found = {}
         for place, answer in side_by_side(do, work, self.device):
             found[place] = answer
+            tell(place, answer)
             self.bar.update(cells[place])
         return [found[place] for place in range(len(work))]
 
@@ -148,6 +178,10 @@ class Rate:
     def each(self) -> float:
         """Seconds per view cell."""
         return self.seconds / self.cells if self.cells else self.guess
+
+    def minute(self, most: int) -> int | None:
+        """View cells of so many that a minute is enough for; None where nothing is known."""
+        return min(most, int(60.0 / self.each)) if self.each else None
 
     def fits(self, cells: int, deadline: float) -> bool:
         """Whether so many more are done by a deadline, as far as is known."""
@@ -230,7 +264,8 @@ def _unrefined(work: Work, parts: "list[Part]", parents: np.ndarray, rate: Rate)
     """What is left of a level, from the cells that should have been refined and the rate of those that were."""
     pairs = sum(int((~part.objects.seen & np.isin(part.objects.source, parents)).sum()) for part in parts)
     needed = time.perf_counter() - work.started + len(parents) * rate.each if rate.cells else None
-    return Shortfall("octree", len(parents), pairs, needed)
+    # What is refined is a parent.
+    return Shortfall("octree", len(parents), pairs, needed, rate.minute(len(parents)))
 
 
 def _too_coarse(part: "Part", count: int, sizes: np.ndarray, settings: "CellSettings") -> np.ndarray:

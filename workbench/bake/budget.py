@@ -92,7 +92,7 @@ def within_budget(
         small = PROBE * work.width
         needed = begun + small * hiding.each + (small + count) * full.each
     pairs = sum(_unknown(done[number]) for number in unfinished) + _unknown(rest)
-    return parts, Shortfall("hiding" if raw else "witnesses", count, pairs, needed)
+    return parts, Shortfall("hiding" if raw else "witnesses", count, pairs, needed, full.minute(count))
 
 
 def _finish(
@@ -204,7 +204,7 @@ class _Coarse:
         """Hide as much as there is time for, once, where that is so many times faster than hiding as a bake does."""
         if self.kept is not None or not self.able:
             return
-        self.kept = np.ones((len(self.cells), len(self.work.engine.unknown(self.cells[:1]).objects)), bool)
+        self.kept = np.ones((len(self.cells), self.work.objects), bool)
         depth = max(0, int(np.ceil(np.log2(len(self.cells) / GROUP))))
         group, rate = self._cut(depth), self._timed(depth)
         if rate.each * 2**depth < hiding.each * len(self.cells) / FASTER:

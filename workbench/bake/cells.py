@@ -53,6 +53,11 @@ class Sources:
     closed: CellGraph | None = None
 
     @property
+    def objects(self) -> int:
+        """Objects of the model."""
+        return 0 if self.model is None else len(self.model.scene.objects)
+
+    @property
     def octree(self) -> bool:
         """Whether cells may be refined."""
         return self.facts.get("inhabitable_because") == "octree"

@@ -287,7 +287,7 @@ def _visibility(
     cut = in_blocks(sources)
     bar = clock.show("visibility", sum(map(len, cut)), "cell")
     deadline = np.inf if run.budget_s is None else started + run.budget_s
-    work = Work(engine, run.device, Store(partial_folder(run.out, run.known)), bar, deadline, started)
+    work = Work(engine, run.device, Store(partial_folder(run.out, run.known)), bar, deadline, started, sources.objects)
     if run.budget_s is None:
         parts, short = work.finish_all(list(enumerate(cut))), None
     else:

@@ -158,6 +158,8 @@ def _budget_words(budget: dict | None) -> list[str]:
     do = "give it more"
     if budget["needed_s"] is not None:
         do = f"--budget {_rounded_up(budget['needed_s']):g} is about enough"
+    if budget.get("minute") and budget["minute"] < budget["cells"]:
+        do = f"another minute finishes about {budget['minute']:,} of those, {do}"
     verb = "is" if budget["pairs"] == 1 else "are"
     left = f"{counted(budget['pairs'], 'pair')} of {counted(budget['cells'], 'view cell')}"
     return [

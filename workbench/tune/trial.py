@@ -129,7 +129,7 @@ def run_trial(
             return Trial(prepared_s + clock.all_s, None)
     if sources.octree:
         with tempfile.TemporaryDirectory() as scratch, phase("octree", 0, "cell") as bar:
-            work = Work(engine, device, Store(Path(scratch)), bar, clock.deadline, clock.start)
+            work = Work(engine, device, Store(Path(scratch)), bar, clock.deadline, clock.start, sources.objects)
             parts, short = refine(sources, work, parts, settings)
             engine = work.engine
         clock.add(0)

@@ -10,6 +10,7 @@ from builders import corridors, random_solids
 from builders.clocks import Clock
 from builders.random_buildings import box_triangles as box
 from builders.random_buildings import scene_of
+from viewcell.data.progress import Phase
 from viewcell.data.scene import Role, Space
 from viewcell.data.view_cells import as_graph
 from viewcell.solvers.visibility.view_cell_engine import ViewCellEngine
@@ -76,6 +77,7 @@ def test_a_budget_that_ends_early_is_told(office, tmp_path):
     assert f"before all that is hidden was found: {pairs:,} pairs of" in budget and "give it more" in budget
     assert facts["budget"] | {"pairs": 0} == {
         "budget_s": 1e-6, "phase": "hiding", "pairs": 0, "cells": facts["counts"]["inhabitable"], "needed_s": None,
+        "minute": None,
     }  # fmt: skip
 
 
@@ -88,6 +90,7 @@ def test_a_budget_that_ends_in_the_middle_advises_one_that_is_enough(shell, tmp_
     assert clock.calls == [False] * 2
     assert facts["budget"] | {"pairs": 0} == {
         "budget_s": 2.5, "phase": "hiding", "cells": count, "pairs": 0, "needed_s": needed,
+        "minute": count,
     }  # fmt: skip
     facts = viewcell.bake(shell, tmp_path / "b", threads=1, budget_s=count + 6.5).manifest
     assert clock.calls[2:] == [False, True] + [False] * count + [True]
@@ -101,6 +104,24 @@ def test_a_budget_that_ends_in_the_middle_advises_one_that_is_enough(shell, tmp_
     assert clock.calls == [False, True] + [True] * count
 
 
+def test_another_minute_is_told(shell, tmp_path, monkeypatch):
+    """Twenty seconds a cell, and as guessed twice as many with witnesses."""
+    Clock(monkeypatch, {False: 20.0, True: 40.0})
+    facts = viewcell.bake(shell, tmp_path / "a", threads=1, budget_s=25.0).manifest
+    assert facts["budget"]["minute"] == 1
+    assert "left undecided, and kept; another minute finishes about 1 of those, --budget " in facts["warnings"][-1]
+
+
+def test_progress_tells_what_is_kept(shell, tmp_path, monkeypatch):
+    notes = []
+    monkeypatch.setattr(Phase, "update", lambda phase, more=1: notes.append(phase.note))
+    made = viewcell.bake(shell, tmp_path / "a")
+    kept = made.potential_objects[made.graph.inhabitable]
+    unknown = 1 - made.manifest["counts"]["object_pairs_seen"] / kept.sum()
+    last = [note for note in notes if note][-1]
+    assert last == f"{kept.mean():.0%} of the objects kept, {unknown:.1%} of that unknown"
+
+
 def test_an_octree_that_is_not_refined_is_told(shell, tmp_path, monkeypatch):
     """The roots take a second each, and so do their children: time for two pieces, the roots, and two families."""
     settings = Settings(method="occluders", cell_size_m=8.0, depth=1, refine_triangles=1)
@@ -109,6 +130,7 @@ def test_an_octree_that_is_not_refined_is_told(shell, tmp_path, monkeypatch):
     facts = viewcell.bake(shell, tmp_path / "tree", settings=settings, threads=1, budget_s=roots + 4.5).manifest
     assert facts["budget"] | {"pairs": 0} == {
         "budget_s": roots + 4.5, "phase": "octree", "cells": roots - 2, "pairs": 0, "needed_s": 2.0 * roots + 2.0,
+        "minute": roots - 2,
     }  # fmt: skip
     assert facts["budget"]["pairs"] <= facts["counts"]["object_pairs"]
     assert (
