@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from ..data.plans import NO_PLANS, Plans
-from .hierarchy import real
+from .hierarchy import high_of, item_of, low_of, real, skip_of
 from .launch import CPU, Device, launch_rows
 from .sightline import PADDING, Triangles, launch_confirm
 
@@ -293,13 +293,13 @@ def _within(
     hi = box_hi[row]
     found = int(0)
     node = int(0)
-    while node < scene.links.shape[0]:
-        link = scene.links[node]
-        low = scene.node_lo[node]
-        high = scene.node_hi[node]
+    while node < scene.nodes.shape[0]:
+        around = scene.nodes[node]
+        low = low_of(around)
+        high = high_of(around)
         inside = low[0] <= hi[0] and low[1] <= hi[1] and low[2] <= hi[2]
         if inside and high[0] >= lo[0] and high[1] >= lo[1] and high[2] >= lo[2]:
-            k = link[1]
+            k = item_of(around)
             if k >= 0:
                 if scene.owner[k] == owner[row]:
                     if item_out.shape[0] > 0:
@@ -308,7 +308,7 @@ def _within(
                     found += 1
             node += 1
         else:
-            node = link[0]
+            node = skip_of(around)
     count_out[row] = found
 
 

@@ -24,7 +24,7 @@ from .curtains import (
 from .ends import CORNERS, Ends, append_corner, append_order, end_missed, has_corner, plan_times
 from .fences import FENCE_WAYS, FIRST_FENCE, append_fence_way, fence_met, fence_of, may_miss
 from .graph import reflect_high, reflect_low
-from .hierarchy import build_hierarchy, larger, smaller
+from .hierarchy import Node, build_hierarchy, item_of, larger, skip_of, smaller
 from .launch import CPU, Device
 from .stab import LIST_CAPACITY, vec6i
 
@@ -47,9 +47,7 @@ class BlockerTree:
     lo: wp.array[wp.vec3i]
     hi: wp.array[wp.vec3i]
     axis: wp.array[int]
-    node_lo: wp.array[wp.vec3i]
-    node_hi: wp.array[wp.vec3i]
-    links: wp.array[wp.vec2i]
+    nodes: wp.array[Node]
 
 
 @wp.func
@@ -158,7 +156,7 @@ def curtain_share(lo: wp.vec3d, hi: wp.vec3d, time: f64, w: wp.vec3d, xi: wp.vec
 
 
 @wp.func
-def node_times(tree: BlockerTree, node: int, swift: wp.vec3d, xi: wp.vec3d) -> wp.vec2d:
+def node_times(node: Node, swift: wp.vec3d, xi: wp.vec3d) -> wp.vec2d:
     """When a line enters a node's box and when it leaves it; later than it enters if it misses the box.
 
     Args:
@@ -167,13 +165,11 @@ def node_times(tree: BlockerTree, node: int, swift: wp.vec3d, xi: wp.vec3d) -> w
         swift: the line's w, negative on the axes that were mirrored; so the box need not be.
         xi: of the line.
     """
-    lo = tree.node_lo[node]
-    hi = tree.node_hi[node]
     first = f64(-1.0e300)
     last = f64(1.0e300)
     for i in range(3):
-        a = swift[i] * f64(lo[i])
-        b = swift[i] * f64(hi[i])
+        a = swift[i] * f64(node[i])
+        b = swift[i] * f64(node[4 + i])
         first = larger(first, smaller(a, b) - xi[i])
         last = smaller(last, larger(a, b) - xi[i])
     return wp.vec2d(first, last)
@@ -205,17 +201,18 @@ def scan(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2i:
         if ((ends.octant >> i) & 1) == 1:
             swift[i] = -w[i]
     node = int(0)
-    count = tree.links.shape[0]
+    count = tree.nodes.shape[0]
     while node < count:
-        link = tree.links[node]
-        met = node_times(tree, node, swift, xi)
+        box = tree.nodes[node]
+        met = node_times(box, swift, xi)
         first = met[0]
         last = met[1]
         if first <= last and first <= enter_plan and last >= leave_plan and (ends.strict == 0 or first < enter_plan):
-            if link[1] >= 0:
-                axis = tree.axis[link[1]]
-                lo = reflect_low(tree.node_lo[node], tree.node_hi[node], ends.octant)
-                hi = reflect_high(tree.node_lo[node], tree.node_hi[node], ends.octant)
+            item = item_of(box)
+            if item >= 0:
+                axis = tree.axis[item]
+                lo = reflect_low(tree.lo[item], tree.hi[item], ends.octant)
+                hi = reflect_high(tree.lo[item], tree.hi[item], ends.octant)
                 value = f64(-200.0)
                 share = wp.vec4d()
                 if axis < FIRST_CURTAIN:
@@ -243,14 +240,14 @@ def scan(tree: BlockerTree, ends: Ends, w: wp.vec3d, xi: wp.vec3d) -> wp.vec2i:
                             best = wp.vec2i(DOUBTFUL, 0)
                 if value > best_strength:
                     best_strength = value
-                    best = wp.vec2i(link[1], side_order(share))
+                    best = wp.vec2i(item, side_order(share))
                     if axis >= FIRST_CURTAIN:
                         best[1] = 0
                     if value >= f64(20.0):
                         return best
             node += 1
         else:
-            node = link[0]
+            node = skip_of(box)
     return best
 
 
@@ -409,4 +406,4 @@ def append_way(
 def blocker_tree(blockers: Blockers, device: Device = CPU) -> BlockerTree:
     """Copy blockers to a device."""
     lo, hi = (device.corners(blockers.boxes[:, side]) for side in (0, 1))
-    return device.struct(BlockerTree, lo=lo, hi=hi, axis=blockers.axis, **build_hierarchy(blockers.boxes).columns)
+    return device.struct(BlockerTree, lo=lo, hi=hi, axis=blockers.axis, nodes=build_hierarchy(blockers.boxes).nodes)

@@ -17,6 +17,8 @@ from .launch import CPU, Scratch, launch_slots
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 f64 = wp.float64
+# All of a node in one place, which is what a line that looks at hundreds of them waits for; see `Hierarchy.nodes`.
+Node = wp.types.vector(length=8, dtype=wp.int32)
 
 # Bins along an axis, between which a node may be split, and their number again.
 BINS = wp.constant(16)
@@ -45,9 +47,9 @@ class Hierarchy:
     links: np.ndarray
 
     @property
-    def columns(self) -> dict[str, np.ndarray]:
-        """As Warp structs name them."""
-        return {"node_lo": self.boxes[:, 0], "node_hi": self.boxes[:, 1], "links": self.links}
+    def nodes(self) -> np.ndarray:
+        """As kernels take them, shape (nodes, 8), int32: low corner, skip, high corner, item."""
+        return np.concatenate([self.boxes[:, 0], self.links[:, :1], self.boxes[:, 1], self.links[:, 1:]], axis=1)
 
 
 @wp.func
@@ -63,6 +65,30 @@ def larger(a: f64, b: f64) -> f64:
 
 
 @wp.func
+def skip_of(node: Node) -> int:
+    """Where to go when the node is missed or done."""
+    return node[3]
+
+
+@wp.func
+def item_of(node: Node) -> int:
+    """What a leaf holds, -1 for other nodes."""
+    return node[7]
+
+
+@wp.func
+def low_of(node: Node) -> wp.vec3i:
+    """Low corner of the node's box."""
+    return wp.vec3i(node[0], node[1], node[2])
+
+
+@wp.func
+def high_of(node: Node) -> wp.vec3i:
+    """High corner of the node's box."""
+    return wp.vec3i(node[4], node[5], node[6])
+
+
+@wp.func
 def inverse(d: wp.vec3d) -> wp.vec3d:
     """One over each component of a segment's way, and a very large number for 0, as of `nears`."""
     out = wp.vec3d()
@@ -74,21 +100,20 @@ def inverse(d: wp.vec3d) -> wp.vec3d:
 
 
 @wp.func
-def nears(p: wp.vec3d, back: wp.vec3d, lo: wp.vec3d, hi: wp.vec3d, padding: f64) -> bool:
-    """Whether a segment meets a box that is padded on all sides, in rounded arithmetic.
+def nears(p: wp.vec3d, back: wp.vec3d, node: Node, padding: f64) -> bool:
+    """Whether a segment meets a node's box that is padded on all sides, in rounded arithmetic.
 
     Args:
         p: where it starts.
         back: the inverse of its way.
-        lo: low corner of the box.
-        hi: high corner.
+        node: with the box.
         padding: more than rounding, which is below 2**-50 of the coordinates.
     """
     first = f64(0.0)
     last = f64(1.0)
     for i in range(3):
-        a = (lo[i] - padding - p[i]) * back[i]
-        b = (hi[i] + padding - p[i]) * back[i]
+        a = (f64(node[i]) - padding - p[i]) * back[i]
+        b = (f64(node[4 + i]) + padding - p[i]) * back[i]
         first = larger(first, smaller(a, b))
         last = smaller(last, larger(a, b))
     return first <= last

@@ -198,7 +198,7 @@ def _meets(
 ):
     row = first + wp.tid()
     node = next_patch(shields, 0, origins[row], ends[row] - origins[row])
-    meets_out[row] = wp.uint8(node < shields.patch_links.shape[0])
+    meets_out[row] = wp.uint8(node < shields.patch_nodes.shape[0])
 
 
 def patches_met(shields: Shields, origins: np.ndarray, ends: np.ndarray, *, device: Device = CPU) -> np.ndarray:

@@ -13,7 +13,7 @@ import warp as wp
 
 from ..data.patches import Patches
 from ..data.regions import Regions
-from .hierarchy import build_hierarchy, inverse, nears, real
+from .hierarchy import Node, build_hierarchy, inverse, item_of, nears, real, skip_of
 from .launch import CPU, Device
 
 f64 = wp.float64
@@ -35,31 +35,26 @@ class Shields:
     v: wp.array[int]
     open_before: wp.array[int]
     region: wp.array[int]
-    node_lo: wp.array[wp.vec3i]
-    node_hi: wp.array[wp.vec3i]
-    links: wp.array[wp.vec2i]
+    nodes: wp.array[Node]
     corners: wp.array[wp.vec3i]
     starts: wp.array[int]
     normal: wp.array[wp.vec3d]
     depth: wp.array[wp.vec2d]
-    patch_lo: wp.array[wp.vec3i]
-    patch_hi: wp.array[wp.vec3i]
-    patch_links: wp.array[wp.vec2i]
+    patch_nodes: wp.array[Node]
 
 
 def device_shields(regions: Regions, patches: Patches, device: Device = CPU) -> Shields:
     """Copy occluders to a device."""
     names = ("axis", "plane", "places", "u", "v", "open_before", "region")
-    nodes = build_hierarchy(patches.boxes).columns
     return device.struct(
         Shields,
         **{name: getattr(regions, name) for name in names},
-        **build_hierarchy(regions.boxes).columns,
+        nodes=build_hierarchy(regions.boxes).nodes,
         corners=device.corners(patches.corners),
         starts=patches.starts,
         normal=patches.normal,
         depth=patches.depth,
-        **{f"patch_{name.removeprefix('node_')}": column for name, column in nodes.items()},
+        patch_nodes=build_hierarchy(patches.boxes).nodes,
     )
 
 
@@ -297,13 +292,13 @@ def blocking_region(shields: Shields, shaft: Shaft, p: wp.vec3d, d: wp.vec3d) ->
     met = int(-1)
     tried = int(-1)
     node = int(0)
-    count = shields.links.shape[0]
+    count = shields.nodes.shape[0]
     back = inverse(d)
     while node < count:
-        link = shields.links[node]
-        if nears(p, back, real(shields.node_lo[node]), real(shields.node_hi[node]), NEAR):
-            if link[1] >= 0:
-                region = shields.region[link[1]]
+        box = shields.nodes[node]
+        if nears(p, back, box, NEAR):
+            if item_of(box) >= 0:
+                region = shields.region[item_of(box)]
                 met = 0
                 # A region's rectangles overlap.
                 if region != tried:
@@ -312,7 +307,7 @@ def blocking_region(shields: Shields, shaft: Shaft, p: wp.vec3d, d: wp.vec3d) ->
                         return wp.vec2i(1, region)
             node += 1
         else:
-            node = link[0]
+            node = skip_of(box)
     return wp.vec2i(met, 0)
 
 
@@ -320,16 +315,16 @@ def blocking_region(shields: Shields, shaft: Shaft, p: wp.vec3d, d: wp.vec3d) ->
 def next_patch(shields: Shields, start: int, p: wp.vec3d, d: wp.vec3d) -> int:
     """Node, from `start` on, of a patch that the segment p + [0, 1] d may meet; past the last if there is none."""
     node = int(start)
-    count = shields.patch_links.shape[0]
+    count = shields.patch_nodes.shape[0]
     back = inverse(d)
     while node < count:
-        link = shields.patch_links[node]
-        if nears(p, back, real(shields.patch_lo[node]), real(shields.patch_hi[node]), NEAR):
-            if link[1] >= 0 and winds(shields, link[1], p, d):
+        box = shields.patch_nodes[node]
+        if nears(p, back, box, NEAR):
+            if item_of(box) >= 0 and winds(shields, item_of(box), p, d):
                 return node
             node += 1
         else:
-            node = link[0]
+            node = skip_of(box)
     return count
 
 
@@ -343,9 +338,9 @@ def find_blocker(shields: Shields, shaft: Shaft) -> wp.vec2i:
         return found
     met = found[0]
     node = next_patch(shields, 0, p, d)
-    while node < shields.patch_links.shape[0]:
+    while node < shields.patch_nodes.shape[0]:
         met = 0
-        patch = shields.patch_links[node][1]
+        patch = item_of(shields.patch_nodes[node])
         if patch_blocks(shields, patch, shaft):
             return wp.vec2i(1, -1 - patch)
         node = next_patch(shields, node + 1, p, d)

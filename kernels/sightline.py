@@ -10,7 +10,7 @@ Source of the bound: Shewchuk 1997, "Adaptive Precision Floating-Point Arithmeti
 import numpy as np
 import warp as wp
 
-from .hierarchy import build_hierarchy, inverse, nears, real
+from .hierarchy import Node, build_hierarchy, inverse, item_of, nears, real, skip_of
 from .launch import CPU, Device, check_coordinates, launch_rows
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -35,9 +35,7 @@ class Triangles:
     owner: wp.array[int]
     opaque: wp.array[wp.uint8]
     running_area: wp.array[f64]
-    node_lo: wp.array[wp.vec3i]
-    node_hi: wp.array[wp.vec3i]
-    links: wp.array[wp.vec2i]
+    nodes: wp.array[Node]
 
 
 def device_triangles(
@@ -60,7 +58,7 @@ def device_triangles(
     a, b, c = (device.corners(triangles[:, i]) for i in range(3))
     opaque = np.ones(len(triangles), bool) if opaque is None else opaque
     columns = {"a": a, "b": b, "c": c, "owner": owners, "opaque": opaque, "running_area": area}
-    return device.struct(Triangles, **columns, **nodes.columns)
+    return device.struct(Triangles, **columns, nodes=nodes.nodes)
 
 
 @wp.func
@@ -116,19 +114,19 @@ def hits(p: wp.vec3d, q: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> boo
 def obstacle(scene: Triangles, p: wp.vec3d, q: wp.vec3d, except_owner: int) -> int:
     """An opaque triangle that pq does not certainly clear, or -1; those of one object excepted (-1: none)."""
     back = inverse(q - p)
-    count = scene.links.shape[0]
+    count = scene.nodes.shape[0]
     node = int(0)
     while node < count:
-        link = scene.links[node]
-        if nears(p, back, real(scene.node_lo[node]), real(scene.node_hi[node]), PADDING):
-            item = link[1]
+        box = scene.nodes[node]
+        if nears(p, back, box, PADDING):
+            item = item_of(box)
             if item >= 0:
                 if scene.owner[item] != except_owner and scene.opaque[item] != wp.uint8(0):
                     if not clears(p, q, real(scene.a[item]), real(scene.b[item]), real(scene.c[item])):
                         return item
             node += 1
         else:
-            node = link[0]
+            node = skip_of(box)
     return -1
 
 
