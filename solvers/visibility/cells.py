@@ -198,7 +198,7 @@ def join_cell_rows(model: CellModel, parts: list[Rows]) -> Rows:
     """All blocks as one table with portals, made symmetric.
 
     A pair of inhabitable cells that one side proves hidden is hidden from the other side too, and a witness from one
-    side serves the other if it also starts outside every solid when it is followed back.
+    side serves the other if it also starts outside every solid when it is followed back, and is followed to its end.
     """
     rows, count = Rows.join(parts), model.graph.cell_count
     key, mirrored = rows.source * count + rows.target, rows.target * count + rows.source
@@ -211,7 +211,8 @@ def join_cell_rows(model: CellModel, parts: list[Rows]) -> Rows:
     if model.sights is not None:
         free = model.sights.outside(rows.source[borrow], start)
         borrow, start, stop = borrow[free], start[free], stop[free]
-    rows.show(borrow, start, stop)
+    there = _reach(model, rows.source[borrow], rows.target[borrow], start, stop)
+    rows.show(borrow[there], start[there], stop[there])
     rows = rows.take(keep).order()
     seen = np.flatnonzero(rows.seen)
     _, starts, portals = launch_trace(
@@ -228,12 +229,15 @@ def accept(model: CellModel, source: np.ndarray, target: np.ndarray, origin: np.
     rows = np.flatnonzero(strictly_inside(origin, cells[source]) & strictly_inside(end, cells[target]))
     if model.sights is not None:
         rows = rows[model.sights.clear(source[rows], origin[rows], end[rows])]
-    reached, _, _ = launch_trace(
-        model.device_graph, source[rows], origin[rows], end[rows], record=False, device=model.device
-    )
     ok = np.zeros(len(source), bool)
-    ok[rows] = reached == target[rows]
+    ok[rows] = _reach(model, source[rows], target[rows], origin[rows], end[rows])
     return ok
+
+
+def _reach(model: CellModel, source: np.ndarray, target: np.ndarray, origin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Segments that float64 follows through portals from their source to their target, shape (n,), bool."""
+    reached, _, _ = launch_trace(model.device_graph, source, origin, end, record=False, device=model.device)
+    return reached == target
 
 
 def strictly_inside(points: np.ndarray, boxes: np.ndarray) -> np.ndarray:

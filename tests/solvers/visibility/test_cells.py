@@ -187,3 +187,21 @@ def test_joined_rows_are_symmetric():
     np.testing.assert_array_equal(rows.end[place], part.origin[back])
     portals = rows.portals[rows.portal_starts[place] : rows.portal_starts[place + 1]]
     assert (graph.portal_cells[portals[0]] == unseen[0]).any() and (graph.portal_cells[portals[-1]] == unseen[1]).any()
+
+
+def test_a_witness_that_is_lost_on_the_way_back_is_not_borrowed(monkeypatch):
+    """Rounding may let a line through a corner of a portal one way and not the other."""
+    graph, _ = random_buildings.random_graph(0, walls=4)
+    engine, trace = GraphEngine(graph), cell_search.launch_trace
+    part = engine.visible(np.arange(graph.cell_count)).cells
+    row = np.flatnonzero((part.source != part.target) & part.seen)[-1]
+    part.verdict[row] = Verdict.UNKNOWN
+
+    def lost(*arguments, record=True, **options):
+        reached, *portals = trace(*arguments, record=record, **options)
+        return reached if record else np.full_like(reached, -1), *portals
+
+    monkeypatch.setattr(cell_search, "launch_trace", lost)
+    rows = join_cell_rows(engine.model, [part])
+    at = np.flatnonzero((rows.source == part.source[row]) & (rows.target == part.target[row]))
+    assert not rows.seen[at].any() and rows.seen.sum() == part.seen.sum()
