@@ -21,9 +21,8 @@ def build_levels(boxes: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
     """
     count = len(boxes)
     depth = int(np.ceil(np.log2(count))) if count > 1 else 0
-    places = np.arange(count) * 2**depth // max(count, 1)
     items = np.full(2**depth, -1, np.int64)
-    items[places] = median_order(boxes.astype(np.int64).sum(axis=1), places, depth)
+    items[leaves_of(boxes, depth)] = np.arange(count)
     bounds = np.empty((2**depth, 2, 3), np.int64)
     bounds[:, 0], bounds[:, 1] = EMPTY, -EMPTY
     bounds[items >= 0] = boxes[items[items >= 0]]
@@ -33,6 +32,15 @@ def build_levels(boxes: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
         bounds = np.stack([pairs[:, :, 0].min(axis=1), pairs[:, :, 1].max(axis=1)], axis=1)
         levels.append(bounds.astype(np.int32))
     return levels[::-1], items
+
+
+def leaves_of(boxes: np.ndarray, depth: int) -> np.ndarray:
+    """Leaf of each box in a tree so deep, shape (n,), int; neighbours share one where there are fewer leaves."""
+    # Spread evenly, so that every subtree gets its share.
+    places = np.arange(len(boxes)) * 2**depth // max(len(boxes), 1)
+    leaves = np.empty(len(boxes), int)
+    leaves[median_order(boxes.astype(np.int64).sum(axis=1), places, depth)] = places
+    return leaves
 
 
 def median_order(centres: np.ndarray, leaves: np.ndarray, depth: int) -> np.ndarray:

@@ -160,7 +160,6 @@ def node_times(node: Node, swift: wp.vec3d, xi: wp.vec3d) -> wp.vec2d:
     """When a line enters a node's box and when it leaves it; later than it enters if it misses the box.
 
     Args:
-        tree: with the node.
         node: of the hierarchy.
         swift: the line's w, negative on the axes that were mirrored; so the box need not be.
         xi: of the line.

@@ -39,17 +39,20 @@ class Hierarchy:
     """Nodes in depth-first order.
 
     Attributes:
-        boxes: shape (nodes, 2, 3), int32.
-        links: shape (nodes, 2), int32: (skip, item of a leaf or -1).
+        nodes: as kernels take them, shape (nodes, 8), int32: low corner, skip, high corner, item of a leaf or -1.
     """
 
-    boxes: np.ndarray
-    links: np.ndarray
+    nodes: np.ndarray
 
     @property
-    def nodes(self) -> np.ndarray:
-        """As kernels take them, shape (nodes, 8), int32: low corner, skip, high corner, item."""
-        return np.concatenate([self.boxes[:, 0], self.links[:, :1], self.boxes[:, 1], self.links[:, 1:]], axis=1)
+    def boxes(self) -> np.ndarray:
+        """Shape (nodes, 2, 3), int32."""
+        return self.nodes.reshape(-1, 2, 4)[:, :, :3]
+
+    @property
+    def links(self) -> np.ndarray:
+        """Skip, and item or -1, shape (nodes, 2), int32."""
+        return self.nodes[:, [3, 7]]
 
 
 @wp.func
@@ -62,6 +65,12 @@ def smaller(a: f64, b: f64) -> f64:
 def larger(a: f64, b: f64) -> f64:
     """The larger of two numbers, as `smaller`."""
     return wp.where(a > b, a, b)
+
+
+@wp.func
+def node_of(lo: wp.vec3i, hi: wp.vec3i, skip: int, item: int) -> Node:
+    """A node from its parts."""
+    return Node(lo[0], lo[1], lo[2], skip, hi[0], hi[1], hi[2], item)
 
 
 @wp.func
@@ -248,9 +257,7 @@ def _build(
     slots: int,
     work: wp.array[f64],
     frames: wp.array[int],
-    node_lo_out: wp.array[wp.vec3i],
-    node_hi_out: wp.array[wp.vec3i],
-    links_out: wp.array[wp.vec2i],
+    nodes_out: wp.array[Node],
 ):
     count = lo.shape[0]
     # The order of the boxes, then the stack.
@@ -271,14 +278,12 @@ def _build(
         for k in range(begin, end):
             bounds_lo = wp.min(bounds_lo, lo[frames[k]])
             bounds_hi = wp.max(bounds_hi, hi[frames[k]])
-        node_lo_out[node] = bounds_lo
-        node_hi_out[node] = bounds_hi
         # A tree with n leaves has 2 n - 1 nodes, so places are known before what is there.
         skip = node + 2 * (end - begin) - 1
         if end - begin == 1:
-            links_out[node] = wp.vec2i(skip, frames[begin])
+            nodes_out[node] = node_of(bounds_lo, bounds_hi, skip, frames[begin])
         else:
-            links_out[node] = wp.vec2i(skip, -1)
+            nodes_out[node] = node_of(bounds_lo, bounds_hi, skip, -1)
             middle = halve(lo, hi, begin, end, work, frames)
             # The smaller half is cut up first: so few wait.
             lower = int(0)
@@ -301,11 +306,9 @@ def build_hierarchy(boxes: np.ndarray) -> Hierarchy:
         boxes: shape (n, 2, 3), integers below 2**29.
     """
     count = len(boxes)
-    nodes = max(2 * count - 1, 0)
-    found = Hierarchy(np.empty((nodes, 2, 3), np.int32), np.empty((nodes, 2), np.int32))
-    if count:
-        lo, hi = (CPU.array(boxes[:, side], wp.vec3i) for side in (0, 1))
-        outputs = [CPU.zeros(nodes, kind) for kind in (wp.vec3i, wp.vec3i, wp.vec2i)]
-        launch_slots(_build, 1, [lo, hi], Scratch(int(WORK_SIZE), count + int(STACK_SIZE)), outputs, CPU)
-        found.boxes[:, 0], found.boxes[:, 1], found.links[:] = (column.numpy() for column in outputs)
-    return found
+    if not count:
+        return Hierarchy(np.zeros((0, 8), np.int32))
+    lo, hi = (CPU.array(boxes[:, side], wp.vec3i) for side in (0, 1))
+    nodes = CPU.zeros(2 * count - 1, Node)
+    launch_slots(_build, 1, [lo, hi], Scratch(int(WORK_SIZE), count + int(STACK_SIZE)), [nodes], CPU)
+    return Hierarchy(nodes.numpy())

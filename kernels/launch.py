@@ -131,10 +131,10 @@ def side_by_side(do: Callable[[Work], Answer], work: Sequence[Work], device: Dev
     if count == 1:
         yield from enumerate(map(do, work))
         return
-    stopped, above = threading.Event(), open_here()
+    stopped, above, share = threading.Event(), open_here(), device.threads_here // count
 
     def begin() -> None:
-        _LANE.threads, _LANE.stopped = device.threads_here // count or 1, stopped
+        _LANE.threads, _LANE.stopped = share, stopped
         go_on(above)
 
     with ThreadPoolExecutor(count, initializer=begin) as pool:

@@ -151,7 +151,7 @@ def left_by_groups(model: OccluderModel, cells: np.ndarray, group: np.ndarray, k
     around, occludees = model.from_cells(boxes), model.occludees
     hide, clear = partial(_hide_nodes, around, None), partial(_clear, around, NO_PLANS)
     found = descend(boxes, np.arange(count), occludees.levels, occludees.objects, FIRST_LEVEL, hide, clear)
-    rows = Rows.unseen(*found).order()
+    rows = Rows.unseen(*found)
     group_of = np.full(len(model.cells), -1)
     group_of[cells] = group
     rows.adopt(known.relabelled(group_of).order())

@@ -1,8 +1,9 @@
 """A bake within a budget: something sound for every view cell first, then what tells most per second.
 
-First what is seen at a glance; then what is hidden, from one block of view cells as a bake does it. Where there is no
-time to do so from all: what occluders hide from groups of neighbouring view cells, one proof for all of a group, then
-from single view cells, those first that keep most. What time is left hides as a bake does, then finds witnesses.
+First what is seen at a glance. Then small pieces of the first blocks tell how long a bake takes: where there is time
+for all of it, that is done. Where there is none even to hide from all, occluders hide from groups of neighbouring view
+cells, one proof for all of a group, then from single ones, those first that keep most. What time is left hides as a
+bake does, then finds witnesses.
 Everything that is not proved hidden by then is kept, and is unknown where it was not seen.
 """
 
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...data.hierarchy import median_order
+from ...data.hierarchy import leaves_of
 from ...data.rows import Rows
 from .blocks import Rate, Shortfall, Work
 
@@ -239,10 +240,7 @@ class _Coarse:
 
     def _cut(self, depth: int) -> np.ndarray:
         """Group of each cell, of neighbours, halved so many times; shape (n,), int."""
-        leaves = np.arange(len(self.cells)) * 2**depth // len(self.cells)
-        group = np.empty(len(self.cells), int)
-        group[median_order(self.boxes[self.cells].astype(np.int64).sum(axis=1), leaves, depth)] = leaves
-        return np.unique(group, return_inverse=True)[1]
+        return np.unique(leaves_of(self.boxes[self.cells], depth), return_inverse=True)[1]
 
     def _ask(self, group: np.ndarray, some: np.ndarray) -> list[Rows]:
         """What some groups of the cells may see, side by side."""
