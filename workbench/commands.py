@@ -100,6 +100,7 @@ def bake(options: argparse.Namespace) -> int:
     settings = Settings(**(file.settings | given))
     if file.line:
         say(f"{options.settings}: {file.line}")
+    settings.check()
     out = Path(options.out) if options.out else default_out(model)
     for folder in [] if options.json else leftovers(out.absolute().parent, out.name):
         say(f"unfinished: {folder.name}; the bake that it is of goes on from there, viewcell clean removes it")

@@ -184,7 +184,10 @@ class Settings(LevelSettings, MethodSettings, CellSettings, ModelSettings):
         check_number("refine-kept", self.refine_kept, 0.0)
         if 0.0 < self.refine_kept < 1.0:
             raise InputError(f"refine-kept: expected 0 or a ratio from 1, found {self.refine_kept:g}")
-        _ = self.frame, self.pixel_limit, self.vlod
+        _ = self.frame, self.pixel_limit
+        # Their module takes half a second to import; the default ones are right.
+        if any(getattr(self, name) != getattr(Settings, name) for name in ("clusters", "objective", "resolution")):
+            _ = self.vlod
 
 
 class SettingsWords(TypedDict, total=False):
