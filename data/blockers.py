@@ -12,6 +12,7 @@ import numpy as np
 
 from .graph import OTHER_AXES, CellGraph
 from .opaque import NO_PLANES, OpaquePlanes
+from .rasters import Rasters
 
 
 @dataclass
@@ -41,30 +42,32 @@ def find_blockers(graph: CellGraph, opaque: OpaquePlanes | None = None) -> Block
         opaque: opaque rectangles, on cell faces or not; None for a bare graph, whose faces say it all.
     """
     opaque = opaque or NO_PLANES
-    pieces, axes = [], []
     index = opaque.index
+    axes, planes, lots = [], [], []
     for axis in range(3):
-        planes = np.unique(np.concatenate([graph.cells[:, :, axis].ravel(), opaque.boxes[axis][:, 0, axis]]))
+        ks = np.unique(np.concatenate([graph.cells[:, :, axis].ravel(), opaque.boxes[axis][:, 0, axis]]))
         low = np.argsort(graph.cells[:, 0, axis], kind="stable")
         starts = graph.cells[low, 0, axis]
-        for k in planes:
+        for k in ks.tolist():
             # Cells are few on a plane; the sorted lows cut the candidates to those that begin at or before it.
             near = low[: np.searchsorted(starts, k, side="right")]
             near = near[graph.cells[near, 1, axis] >= k]
-            rectangles = _plane_blockers(graph, axis, int(k), near, index.rectangles(axis, int(k)))
-            if len(rectangles):
-                u, v = OTHER_AXES[axis]
-                boxes = np.full((len(rectangles), 2, 3), k, np.int32)
-                boxes[:, :, u], boxes[:, :, v] = rectangles[:, :, 0], rectangles[:, :, 1]
-                pieces.append(boxes)
-                axes.append(np.full(len(boxes), axis, np.int32))
-    boxes = np.concatenate(pieces) if pieces else np.zeros((0, 2, 3), np.int32)
-    axis_of = np.concatenate(axes) if axes else np.zeros(0, np.int32)
-    return Blockers(boxes, axis_of)
+            lots.append(_on_plane(graph, axis, k, near, index.rectangles(axis, k)))
+            axes.append(axis)
+            planes.append(k)
+    axes, planes = np.array(axes, np.int32), np.array(planes, np.int32)
+    plane, rectangles = _largest(lots)
+    boxes = np.repeat(planes[plane, None], 6, axis=1).reshape(-1, 2, 3)
+    for axis in range(3):
+        mine = np.flatnonzero(axes[plane] == axis)
+        boxes[np.ix_(mine, [0, 1], OTHER_AXES[axis])] = rectangles[mine]
+    return Blockers(boxes, axes[plane])
 
 
-def _plane_blockers(graph: CellGraph, axis: int, k: int, near: np.ndarray, opaque: np.ndarray) -> np.ndarray:
-    """Maximal blocked rectangles of one plane that hold something opaque in reach of live cells; (n, 2, 2), int32."""
+def _on_plane(
+    graph: CellGraph, axis: int, k: int, near: np.ndarray, opaque: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rectangles of a plane, each (n, 2, 2): opaque ones in reach of live cells, gaps, and faces of cells."""
     uv = OTHER_AXES[axis]
     cells = graph.cells[near]
     faces = cells[(cells[:, 0, axis] == k) | (cells[:, 1, axis] == k)][:, :, uv]
@@ -73,58 +76,36 @@ def _plane_blockers(graph: CellGraph, axis: int, k: int, near: np.ndarray, opaqu
     gaps = np.concatenate([through, graph.portals[on_plane][:, :, uv]])
     everything = np.concatenate([faces, gaps])
     if not len(everything):
-        return np.zeros((0, 2, 2), np.int32)
+        return everything, everything, everything
     # What lies beyond the live cells is blocked anyway, and clipping keeps the raster inside them.
     opaque = np.clip(opaque, everything.min(axis=(0, 1)), everything.max(axis=(0, 1)))
-    opaque = opaque[(opaque[:, 1] > opaque[:, 0]).all(axis=1)]
-    everything = np.concatenate([everything, opaque])
-    us, vs = np.unique(everything[:, :, 0]), np.unique(everything[:, :, 1])
-    solid, open_ = paint(opaque, us, vs), paint(gaps, us, vs)
-    blocked = solid | ~open_
-    # A wall inside a solid hides nothing that the solid's faces do not.
-    wanted = (paint(faces, us, vs) & blocked) | (solid & open_)
-    return maximal_rectangles(blocked, wanted, us, vs)
+    return opaque[(opaque[:, 1] > opaque[:, 0]).all(axis=1)], gaps, faces
 
 
-def paint(rectangles: np.ndarray, us: np.ndarray, vs: np.ndarray) -> np.ndarray:
-    """Raster cells covered by any of the rectangles (n, 2, 2), whose corners are all in us and vs; bool."""
-    heights = np.zeros((len(us), len(vs)), np.int32)
-    u = np.searchsorted(us, rectangles[:, :, 0])
-    v = np.searchsorted(vs, rectangles[:, :, 1])
-    for i, j, sign in ((0, 0, 1), (0, 1, -1), (1, 0, -1), (1, 1, 1)):
-        np.add.at(heights, (u[:, i], v[:, j]), sign)
-    return heights.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
+def _largest(lots: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Maximal blocked rectangles of each plane that hold something opaque in reach of live cells.
 
+    Args:
+        lots: of each plane, as from `_on_plane`.
 
-def maximal_rectangles(blocked: np.ndarray, wanted: np.ndarray, us: np.ndarray, vs: np.ndarray) -> np.ndarray:
-    """Rectangles inside `blocked` that cannot grow and together cover `wanted`; shape (n, 2, 2), int32."""
-    found: set[tuple[int, int, int, int]] = set()
-    left = wanted.copy()
-    while left.any():
-        i, j = divmod(int(left.argmax()), left.shape[1])
-        for first in (0, 1):
-            u0, u1, v0, v1 = grow(blocked, i, j, first)
-            left[u0:u1, v0:v1] = False
-            found.add((u0, u1, v0, v1))
-    if not found:
-        return np.zeros((0, 2, 2), np.int32)
-    u0, u1, v0, v1 = np.array(sorted(found)).T
-    return np.stack([np.stack([us[u0], vs[v0]], axis=1), np.stack([us[u1], vs[v1]], axis=1)], axis=1).astype(np.int32)
-
-
-def grow(blocked: np.ndarray, i: int, j: int, first: int) -> tuple[int, int, int, int]:
-    """Grow raster cell (i, j) inside `blocked`, along axis `first` before the other: u0, u1, v0, v1 (past the end)."""
-    if first == 1:
-        v0, v1, u0, u1 = grow(blocked.T, j, i, 0)
-        return u0, u1, v0, v1
-    u0, u1 = _run(blocked[:, j], i)
-    v0, v1 = _run(blocked[u0:u1].all(axis=0), j)
-    return u0, u1, v0, v1
-
-
-def _run(row: np.ndarray, i: int) -> tuple[int, int]:
-    """The run of true values around i: first and past-the-last index."""
-    ahead, behind = row[i:], row[i::-1]
-    last, first = int(ahead.argmin()), int(behind.argmin())
-    # The least of all true values is the first of them.
-    return (0 if behind[first] else i - first + 1), (len(row) if ahead[last] else i + last)
+    Returns:
+        Plane of each, ascending, and corners, shape (n, 2, 2), int32.
+    """
+    kinds = []
+    for kind in range(3):
+        owner = np.repeat(np.arange(len(lots)), [len(lot[kind]) for lot in lots])
+        kinds.append((owner, np.concatenate([np.zeros((0, 2, 2), np.int64), *(lot[kind] for lot in lots)])))
+    points = [[(np.repeat(owner, 2), part[:, :, c].ravel()) for owner, part in kinds] for c in (0, 1)]
+    owners, found = [np.zeros(0, np.int64)], [np.zeros((0, 2, 2), np.int32)]
+    for first, rasters in Rasters.of(points, len(lots)).lots():
+        painted = []
+        for owner, part in kinds:
+            a, b = np.searchsorted(owner, [first, first + len(rasters)])
+            painted.append(rasters.paint(owner[a:b] - first, part[a:b]))
+        solid, open_, faces = painted
+        blocked = (rasters.area > 0) & (solid | ~open_)
+        # A wall inside a solid hides nothing that the solid's faces do not.
+        owner, rectangles = rasters.maximal(blocked, (faces & blocked) | (solid & open_))
+        owners.append(owner + first)
+        found.append(rectangles)
+    return np.concatenate(owners), np.concatenate(found)

@@ -10,17 +10,19 @@ with its halves, their halves, and so on. Source of the idea of occluders at any
 5.2; the ways past them are in kernels/curtains.py.
 """
 
+from collections.abc import Iterator
 from fractions import Fraction
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 
-from .blockers import Blockers, maximal_rectangles, paint
-from .opaque import plane_rectangles
+from .blockers import Blockers
+from .outlines import outline, tiles
 from .progress import track
-from .regions import section_rectangles
+from .ragged import places_of, starts_of
 from .scene import turned
-from .solids import winding_numbers
+from .sections import largest_sections, over
+from .solids import winds_around
 
 # `Blockers.axis` of a curtain from the corner of its plan box with the least x and y to the opposite one, and of one
 # from least x and greatest y.
@@ -29,8 +31,9 @@ RISING, FALLING = 3, 4
 LEAST_M2 = 0.25
 # Halving a curtain ends here.
 PIECE_M = 0.25
-# Pairs of a rectangle and a triangle that are looked at together.
+# Pairs of a rectangle and a triangle that are looked at together, and triangles of elements that are cut together.
 PAIRS = 100_000
+TRIANGLES = 20_000
 # Elements are cut so far inside their faces [grid steps], and through the middle where they are thinner than THIN_M.
 RECESS, ENDS = 4, 2
 THIN_M = 0.6
@@ -55,16 +58,22 @@ def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float) 
     """
     least = LEAST_M2 / grid_m**2
     boxes, kinds = [np.zeros((0, 2, 3), np.int64)], [np.zeros(0, np.int64)]
-    for triangles in track(elements, "curtains", "element"):
-        quads = _sections(triangles, least, THIN_M / grid_m)
-        if not len(quads):
-            continue
-        quads = quads[inside(quads, triangles)]
-        for part in [*_pieces(quads, PIECE_M / grid_m), *_tips(quads, triangles)]:
+    for lot in track(lots_of(elements), "curtains", "lot"):
+        owner, quads = _sections(lot, least, THIN_M / grid_m)
+        held = inside(quads, owner, lot)
+        owner, quads = owner[held], quads[held]
+        for part in [*_pieces(quads, PIECE_M / grid_m), *_tips(quads, owner, lot)]:
             _add(boxes, kinds, part)
     _add(boxes, kinds, _upright_faces(faces, least))
     joined = np.concatenate(boxes).astype(np.int32)
     return Blockers(joined, np.concatenate(kinds).astype(np.int32))
+
+
+def lots_of(elements: list[np.ndarray]) -> list[list[np.ndarray]]:
+    """Elements in lots of about TRIANGLES triangles, which are cut together."""
+    total = np.cumsum([len(triangles) for triangles in elements], dtype=np.int64)
+    ends = np.flatnonzero(np.diff(total // TRIANGLES)) + 1
+    return [elements[a:b] for a, b in pairwise([0, *ends.tolist(), len(elements)]) if a < b]
 
 
 def _add(boxes: list[np.ndarray], kinds: list[np.ndarray], quads: np.ndarray) -> None:
@@ -108,49 +117,34 @@ def _directions(triangles: np.ndarray, least: float) -> list[tuple[float, np.nda
     return found
 
 
-def _sections(triangles: np.ndarray, least: float, thin: float) -> np.ndarray:
-    """Rectangles in sections of one element along its oblique faces: (A, B) x (x, y, z), shape (n, 2, 3), int64."""
-    quads = [np.zeros((0, 2, 3), np.int64)]
-    for yaw, depths in _directions(triangles, least):
-        level = np.round(turned(triangles.astype(float), -yaw)).astype(np.int64)
-        low, high = level[:, :, 0].min(axis=1), level[:, :, 0].max(axis=1)
-        for depth in cuts_inside(depths, int(low.min()), int(high.max()), thin):
-            # Where the element's own coordinates are rounded into this frame a section may touch its border.
-            largest = largest_sections(level[(low < depth) & (high >= depth)], 0, depth, (ENDS, 0), least)
-            corners = np.concatenate([np.full((len(largest), 2, 1), depth), largest], axis=2)
-            quads.append(np.round(turned(corners.astype(float), yaw)).astype(np.int64))
-    found = np.concatenate(quads)
+def _sections(elements: list[np.ndarray], least: float, thin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rectangles in sections of elements along their oblique faces.
+
+    Returns:
+        Element of each, ascending, shape (n,), and (A, B) x (x, y, z), shape (n, 2, 3), int64.
+    """
+    cuts, yaws, of = [], [], []
+    for number, triangles in enumerate(elements):
+        for yaw, depths in _directions(triangles, least):
+            level = np.round(turned(triangles.astype(float), -yaw)).astype(np.int64)
+            for depth in cuts_inside(depths, int(level[:, :, 0].min()), int(level[:, :, 0].max()), thin):
+                cuts.append(over(level, 0, depth))
+                yaws.append(yaw)
+                of.append(number)
+    # Where the element's own coordinates are rounded into its frame a section may touch its border.
+    cut, largest = largest_sections(cuts, np.tile([ENDS, 0], (len(cuts), 1)), least)
+    depth = np.array([section.plane for section in cuts], np.int64)[cut]
+    level = np.concatenate([np.repeat(depth, 2).reshape(-1, 2, 1), largest], axis=2).astype(float)
+    # Each is turned by its own angle.
+    yaw, quads = np.array(yaws)[cut], np.empty(level.shape)
+    for angle in np.unique(yaw):
+        quads[yaw == angle] = turned(level[yaw == angle], angle)
+    found = np.round(quads).astype(np.int64)
     # A has the least x, and of two the least y.
     swap = (found[:, 0, 0] > found[:, 1, 0]) | ((found[:, 0, 0] == found[:, 1, 0]) & (found[:, 0, 1] > found[:, 1, 1]))
     found[swap, :, :2] = found[swap, ::-1, :2]
-    return np.unique(found, axis=0)
-
-
-def largest_sections(
-    cut: np.ndarray, axis: int, k: int, ends: tuple[int, int], least: float, *, below: bool = True
-) -> np.ndarray:
-    """The largest rectangles inside the section of a closed surface by a plane, as `section_rectangles` takes it.
-
-    Args:
-        cut: its triangles that reach over the plane [grid steps], shape (m, 3, 3), int.
-        axis: perpendicular to the plane.
-        k: coordinate of the plane.
-        ends: what each rectangle is cut short by, on both of its ends, along u and v [grid steps].
-        least: smaller ones are left out [squared grid steps].
-        below: section just below the plane, or just above it.
-
-    Returns:
-        Shape (n, 2, 2), int64, overlapping.
-    """
-    rectangles = section_rectangles(cut, axis, k, below=below) if len(cut) else np.zeros((0, 2, 2), np.int64)
-    if not len(rectangles):
-        return rectangles
-    us, vs = np.unique(rectangles[:, :, 0]), np.unique(rectangles[:, :, 1])
-    solid = paint(rectangles, us, vs)
-    largest = maximal_rectangles(solid, solid, us, vs).astype(np.int64)
-    largest += np.array([ends, ends]) * np.array([[1], [-1]])
-    size = largest[:, 1] - largest[:, 0]
-    return largest[(size > 0).all(axis=1) & (size.prod(axis=1) >= least)]
+    rows = np.unique(np.column_stack([np.array(of, np.int64)[cut], found.reshape(-1, 6)]), axis=0)
+    return rows[:, 0], rows[:, 1:].reshape(-1, 2, 3)
 
 
 def cuts_inside(depths: np.ndarray, low: int, high: int, thin: float, recess: int = RECESS) -> list[int]:
@@ -185,30 +179,70 @@ def _pieces(quads: np.ndarray, least: float) -> list[np.ndarray]:
     return found
 
 
-def inside(quads: np.ndarray, triangles: np.ndarray, margin: float = CLEAR_STEPS) -> np.ndarray:
-    """Rectangles inside a closed surface none of whose triangles comes within a margin of them, shape (n,), bool.
+def inside(quads: np.ndarray, owner: np.ndarray, elements: list[np.ndarray], margin: float = CLEAR_STEPS) -> np.ndarray:
+    """Rectangles inside a closed surface of which no triangle comes within a margin of them.
 
-    Arguments as of `meeting`.
+    Args:
+        quads: (A, B) x (x, y, z) [grid steps], shape (n, 2, 3).
+        owner: element of each, ascending, shape (n,).
+        elements: triangles of each closed surface, (m, 3, 3).
+        margin: as of `meeting`.
+
+    Returns:
+        Shape (n,), bool.
     """
-    held = np.abs(winding_numbers(quads.mean(axis=1), triangles)) > 0.5
+    held = np.zeros(len(quads), bool)
+    for rows, row, triangles in _pairs(quads, owner, elements):
+        held[rows] = winds_around(quads[rows].mean(axis=1), row, triangles)
     rows = np.flatnonzero(held)
-    held[rows[meeting(quads[rows], triangles, margin)[0]]] = False
+    for part, row, triangles in _pairs(quads[rows], owner[rows], elements):
+        near = meeting(quads[rows[part]], row, triangles, margin)
+        held[rows[part][row[near]]] = False
     return held
 
 
-def _tips(quads: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _pairs(
+    quads: np.ndarray, owner: np.ndarray, elements: list[np.ndarray]
+) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+    """Rectangles in lots with all triangles of their elements: which, row in the lot and triangle of each pair."""
+    sizes = np.array([len(triangles) for triangles in elements], np.int64)
+    starts = starts_of(sizes)
+    every = np.concatenate([np.zeros((0, 3, 3), np.int32), *elements])
+    total = np.cumsum(sizes[owner])
+    for first, stop in pairwise([0, *(np.flatnonzero(np.diff(total // PAIRS)) + 1).tolist(), len(quads)]):
+        mine = owner[first:stop]
+        row = np.repeat(np.arange(stop - first), sizes[mine])
+        yield slice(first, stop), row, every[places_of(starts[mine], sizes[mine])]
+
+
+def _tips(quads: np.ndarray, owner: np.ndarray, elements: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Rectangles from the ends of sections to upright edges of their element nearby: (A, B) x (x, y, z), (n, 2, 3).
 
     A section ends some steps short of the end of a wall. What it leaves open to the corner, where the next wall begins,
     they close: those from the near end. Those from the far end hide what stands behind the corner from eyes that look
     along the wall.
     """
+    found: list[list[np.ndarray]] = [[], []]
+    owners: list[list[np.ndarray]] = [[], []]
+    starts = np.searchsorted(owner, np.arange(len(elements) + 1))
+    for number, triangles in enumerate(elements):
+        mine = quads[starts[number] : starts[number + 1]]
+        for kind, part in enumerate(_to_corners(mine, triangles)) if len(mine) else ():
+            found[kind].append(part)
+            owners[kind].append(np.full(len(part), number))
+    none = np.zeros((0, 2, 3), np.int64)
+    return tuple(
+        _opaque(np.concatenate([none, *parts]), np.concatenate([none[:, 0, 0], *of]), elements)
+        for parts, of in zip(found, owners, strict=True)
+    )
+
+
+def _to_corners(quads: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
+    """Rectangles of one element from the near ends of its sections, and from their far ends."""
     t = triangles.astype(np.int64)
     edges = np.concatenate([t[:, [k, (k + 1) % 3]] for k in range(3)])
     upright = (edges[:, 0, :2] == edges[:, 1, :2]).all(axis=1)
     edges = np.unique(np.sort(edges[upright], axis=1), axis=0)
-    if not len(quads):
-        return quads, quads
     end, other = quads[:, [0, 1], :2], quads[:, [1, 0], :2]
     low, high = edges[:, 0], edges[:, 1]
     # Shape (quads, ends, edges, 2).
@@ -223,17 +257,21 @@ def _tips(quads: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndar
         swap = np.lexsort(part.transpose(2, 0, 1)[::-1], axis=1)
         part = np.concatenate([np.take_along_axis(part, swap[:, :, None], axis=1), z[:, :, None]], axis=2)
         found.append(np.unique(part[z[:, 0] < z[:, 1]], axis=0))
-    return tuple(_opaque(part, triangles) for part in found)
+    return found
 
 
-def _opaque(quads: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Those of some rectangles that lie inside a closed surface, borders aside; exactly."""
-    quads = quads[np.abs(winding_numbers(quads.mean(axis=1), triangles)) > 0.5]
-    clear = np.ones(len(quads), bool)
-    rows, near = meeting(quads, triangles, CLEAR_STEPS)
-    doubtful = ~clearly_missed(quads[rows], triangles[near])
-    for row, which in zip(rows[doubtful], near[doubtful], strict=True):
-        clear[row] = clear[row] and not crossed(quads[row], triangles[which])
+def _opaque(quads: np.ndarray, owner: np.ndarray, elements: list[np.ndarray]) -> np.ndarray:
+    """Those of some rectangles that lie inside the closed surfaces that own them, borders aside; exactly."""
+    clear = np.zeros(len(quads), bool)
+    for rows, row, triangles in _pairs(quads, owner, elements):
+        held = winds_around(quads[rows].mean(axis=1), row, triangles)
+        near = np.flatnonzero(held[row])
+        near = near[meeting(quads[rows], row[near], triangles[near], CLEAR_STEPS)]
+        near = near[~clearly_missed(quads[rows][row[near]], triangles[near])]
+        for which in near.tolist():
+            if held[row[which]] and crossed(quads[rows][row[which]], triangles[which]):
+                held[row[which]] = False
+        clear[rows] = held
     return quads[clear]
 
 
@@ -294,43 +332,41 @@ def _cuts_through(points: list[tuple[int, int, int]], length: int, low: int, hig
     return True
 
 
-def meeting(quads: np.ndarray, triangles: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
+def meeting(quads: np.ndarray, row: np.ndarray, triangles: np.ndarray, margin: float) -> np.ndarray:
     """Pairs of an upright rectangle and a triangle that may come within a margin of its inside.
 
     Separating axes in the frame of the rectangle, in float64; what lies near is on the side of "may".
 
     Args:
         quads: (A, B) x (x, y, z) [grid steps], shape (n, 2, 3).
-        triangles: shape (m, 3, 3).
+        row: rectangle of each pair, shape (pairs,).
+        triangles: of each pair, shape (pairs, 3, 3).
         margin: [grid steps], out of the plane of the rectangle and along it; up and down it is 0.
 
     Returns:
-        Rows of both, shape (pairs,).
+        Which pairs, ascending.
     """
-    found = [np.zeros((2, 0), int)]
-    step = max(1, PAIRS // max(1, len(triangles)))
-    for begin in range(0, len(quads), step):
-        rows, near = _meeting(quads[begin : begin + step].astype(float), triangles.astype(float), margin)
-        found.append(np.stack([rows + begin, near]))
-    return tuple(np.concatenate(found, axis=1))
-
-
-def _meeting(quads: np.ndarray, triangles: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
-    """As `meeting`, of few enough."""
-    along = quads[:, 1, :2] - quads[:, 0, :2]
+    # Boxes part most of them. Top and bottom are exact: what only touches them does not part the rectangle.
+    low, high = quads.min(axis=1), quads.max(axis=1)
+    around = np.array([2.0, 2.0, 0.0]) * (margin + 1.0)
+    low, high = low - around, high + around
+    one, two, three = triangles.transpose(1, 2, 0)
+    outside = np.zeros(len(row), bool)
+    for axis in range(3):
+        outside |= np.minimum(np.minimum(one[axis], two[axis]), three[axis]) >= high[row, axis]
+        outside |= np.maximum(np.maximum(one[axis], two[axis]), three[axis]) <= low[row, axis]
+    which = np.flatnonzero(~outside)
+    q, t = quads[row[which]].astype(float), triangles[which].astype(float)
+    along = q[:, 1, :2] - q[:, 0, :2]
     length = np.hypot(along[:, 0], along[:, 1])
     along = along / length[:, None]
-    x, y = (triangles[None, :, :, axis] - quads[:, 0, axis, None, None] for axis in (0, 1))
-    ux, uy = along[:, 0, None, None], along[:, 1, None, None]
+    x, y = (t[:, :, axis] - q[:, :1, axis] for axis in (0, 1))
+    ux, uy = along[:, :1], along[:, 1:]
     # Along the rectangle, and out of its plane.
     u, d = x * ux + y * uy, y * ux - x * uy
-    low, high = triangles[:, :, 2].min(axis=1), triangles[:, :, 2].max(axis=1)
-    near = (d.min(axis=2) <= margin) & (d.max(axis=2) >= -margin)
-    near &= (u.min(axis=2) <= length[:, None] + margin) & (u.max(axis=2) >= -margin)
-    # Top and bottom are exact: what only touches them does not part the rectangle.
-    near &= (low < quads[:, 1, None, 2]) & (high > quads[:, 0, None, 2])
-    rows, which = np.nonzero(near)
-    u, d, z = u[rows, which], d[rows, which], triangles[which, :, 2]
+    near = (d.min(axis=1) <= margin) & (d.max(axis=1) >= -margin)
+    near &= (u.min(axis=1) <= length + margin) & (u.max(axis=1) >= -margin)
+    which, u, d, z, q, length = which[near], u[near], d[near], t[near, :, 2], q[near], length[near]
     # The part of each triangle within the margin of the plane, as the points that bound it.
     us, zs, used = [], [], []
     for k in range(3):
@@ -340,15 +376,15 @@ def _meeting(quads: np.ndarray, triangles: np.ndarray, margin: float) -> tuple[n
         used.append(np.abs(d[:, k]) <= margin)
         rise = d[:, j] - d[:, k]
         for level in (-margin, margin):
-            share = np.divide(level - d[:, k], rise, out=np.full(len(rows), -1.0), where=rise != 0)
+            share = np.divide(level - d[:, k], rise, out=np.full(len(which), -1.0), where=rise != 0)
             us.append(u[:, k] + share * (u[:, j] - u[:, k]))
             zs.append(z[:, k] + share * (z[:, j] - z[:, k]))
             used.append((share >= 0) & (share <= 1))
     us, zs, used = np.stack(us), np.stack(zs), np.stack(used)
     # A polygon and a rectangle of a plane are apart if a line along a side of either parts them.
-    right, bottom, top = length[rows] + margin, quads[rows, 0, 2], quads[rows, 1, 2]
-    corners = [(side, level) for side in (np.full(len(rows), -margin), right) for level in (bottom, top)]
-    one, none = np.ones(len(rows)), np.zeros(len(rows))
+    right, bottom, top = length + margin, q[:, 0, 2], q[:, 1, 2]
+    corners = [(side, level) for side in (np.full(len(which), -margin), right) for level in (bottom, top)]
+    one, none = np.ones(len(which)), np.zeros(len(which))
     axes = [(one, none), (none, one)]
     axes += [(z[:, k] - z[:, (k + 1) % 3], u[:, (k + 1) % 3] - u[:, k]) for k in range(3)]
     parted = ~used.any(axis=0)
@@ -356,7 +392,7 @@ def _meeting(quads: np.ndarray, triangles: np.ndarray, margin: float) -> tuple[n
         value, box = us * a + zs * b, np.stack([cu * a + cz * b for cu, cz in corners])
         least, most = np.where(used, value, np.inf).min(axis=0), np.where(used, value, -np.inf).max(axis=0)
         parted |= ((least >= box.max(axis=0)) | (most <= box.min(axis=0))) & ((a != 0) | (b != 0))
-    return rows[~parted], which[~parted]
+    return which[~parted]
 
 
 def _upright_faces(triangles: np.ndarray, least: float) -> np.ndarray:
@@ -370,20 +406,15 @@ def _upright_faces(triangles: np.ndarray, least: float) -> np.ndarray:
     two &= (extent[:, :2] > 0).all(axis=1) & (np.hypot(extent[:, 0], extent[:, 1]) * extent[:, 2] >= least / 4)
     t, key, order = t[two], key[two], order[two]
     ends = order[:, [0, 2]]
-    _, group = np.unique(ends, axis=0, return_inverse=True)
-    group = group.ravel()
-    rows = np.argsort(group, kind="stable")
-    found = [np.zeros((0, 2, 3), np.int64)]
-    for part in np.split(rows, np.flatnonzero(np.diff(group[rows])) + 1) if len(rows) else []:
-        # Over the first point 0, over the second one 1.
-        side = (key[part] != ends[part[0], 0]).astype(np.int64)
-        first, second = (t[part][key[part] == end][0, :2] for end in ends[part[0]])
-        flat, _, _ = plane_rectangles(np.stack([side, t[part, :, 2]], axis=2).astype(np.int32), 1)
-        flat = flat[(flat[:, 0, 0] == 0) & (flat[:, 1, 0] == 1)].astype(np.int64)
-        size = (flat[:, 1, 1] - flat[:, 0, 1]) * np.hypot(*(second - first))
-        flat = flat[size >= least]
-        quad = np.empty((len(flat), 2, 3), np.int64)
-        quad[:, 0, :2], quad[:, 1, :2] = first, second
-        quad[:, :, 2] = flat[:, :, 1]
-        found.append(quad)
-    return np.concatenate(found)
+    group, which = np.unique(ends, axis=0, return_inverse=True)
+    which = which.ravel()
+    # Over the first point 0, over the second one 1.
+    side = (key != ends[:, :1]).astype(np.int64)
+    face, flat = tiles(outline(np.stack([side, t[:, :, 2]], axis=2), which, len(group)), 1)
+    whole = (flat[:, 0, 0] == 0) & (flat[:, 1, 0] == 1)
+    face, flat = face[whole], flat[whole]
+    points = np.empty((len(group), 2, 2), np.int64)
+    points[which[:, None], side] = t[:, :, :2]
+    quads = np.concatenate([points[face], flat[:, :, 1:]], axis=2)
+    size = (flat[:, 1, 1] - flat[:, 0, 1]) * np.hypot(*(quads[:, 1, :2] - quads[:, 0, :2]).T)
+    return quads[size >= least]

@@ -10,12 +10,11 @@ Only faces over the same two grid points are compared: their planes are equal, n
 
 from collections import defaultdict
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from .curtains import inside
-from .opaque import plane_rectangles
+from .outlines import outline, tiles
 from .plans import are_convex
 
 # A face at an angle is held by a prism that reaches so far into its element, and there ends so far short of its ends.
@@ -48,14 +47,6 @@ class UprightFace:
         length = float(np.hypot(*way))
         return way / length, length
 
-    @cached_property
-    def bands(self) -> np.ndarray:
-        """Heights between which it fills the whole segment, shape (n, 2), int64."""
-        side = (self.corners[:, :, :2] == self.ends[1]).all(axis=2)
-        flat = np.stack([side.astype(np.int64), self.corners[:, :, 2]], axis=2)
-        bands, _, _ = plane_rectangles(flat.astype(np.int32), 1)
-        return bands[(bands[:, 0, 0] == 0) & (bands[:, 1, 0] == 1)][:, :, 1].astype(np.int64)
-
 
 def exposed_faces(closed: list[tuple[int, np.ndarray]]) -> dict[int, list[UprightFace]]:
     """Uncovered upright faces of each element that has covered ones, and whose other faces are all level.
@@ -64,33 +55,62 @@ def exposed_faces(closed: list[tuple[int, np.ndarray]]) -> dict[int, list[Uprigh
         closed: (object_id, triangles (m, 3, 3) int32) of closed opaque elements, as of `closed_elements`.
     """
     solids = dict(closed)
-    faces = {object_id: found for object_id, triangles in closed if (found := _upright_faces(triangles)) is not None}
+    found = {object_id: own for object_id, triangles in closed if (own := _upright_faces(triangles)) is not None}
+    faces = [(object_id, face) for object_id, own in found.items() for face in own]
     behind = defaultdict(list)
-    for object_id, found in faces.items():
-        for face in found:
-            behind[face.ends.tobytes()].append((object_id, face))
+    for place, (_, face) in enumerate(faces):
+        behind[face.ends.tobytes()].append(place)
+    against = [
+        [other for other in behind.get(face.ends[::-1].tobytes(), ()) if faces[other][0] != object_id]
+        for object_id, face in faces
+    ]
+    # Most faces have none against them, and are not asked what they are made of.
+    asked = sorted({place for places in against for place in places})
+    backed = _backed([faces[place] for place in asked], solids)
+    whole = dict(zip(asked, backed, strict=True))
 
-    def covered(owner: int, face: UprightFace) -> bool:
-        against = [part for part in behind.get(face.ends[::-1].tobytes(), ()) if part[0] != owner]
-        bands = [other.bands for number, other in against if _backed(other, solids[number])]
-        return bool(bands) and _fills(bands, face) and _backed(face, solids[owner])
+    def covered(place: int) -> bool:
+        bands = [bands for other in against[place] if (bands := whole[other]) is not None]
+        return bool(bands) and whole.get(place) is not None and _fills(bands, faces[place][1])
 
     exposed = {}
-    for object_id, found in faces.items():
-        hidden = [covered(object_id, face) for face in found]
+    places = iter(range(len(faces)))
+    for object_id, own in found.items():
+        hidden = [covered(next(places)) for _ in own]
         if any(hidden):
-            exposed[object_id] = [face for face, gone in zip(found, hidden, strict=True) if not gone]
+            exposed[object_id] = [face for face, gone in zip(own, hidden, strict=True) if not gone]
     return exposed
 
 
-def _backed(face: UprightFace, solid: np.ndarray) -> bool:
-    """Whether a closed solid holds what lies behind a face of its: it is neither inside out nor thinner than a step."""
-    along, length = face.along
-    short = min(SHORT, length / 4) * along
-    quads = np.empty((len(face.bands), 2, 3))
-    quads[:, :, :2] = face.ends + np.array([short, -short]) + BESIDE * np.array([-along[1], along[0]])
-    quads[:, :, 2] = face.bands
-    return bool(inside(quads, solid, BESIDE / 2).all())
+def _backed(faces: list[tuple[int, UprightFace]], solids: dict[int, np.ndarray]) -> list[np.ndarray | None]:
+    """Heights between which each face fills its whole segment, shape (n, 2), int64, if its solid lies behind it there.
+
+    A closed solid that is inside out, or thinner than a step, does not.
+    """
+    owner = np.repeat(np.arange(len(faces)), [len(face.corners) for _, face in faces])
+    flat = [
+        np.stack([(face.corners[:, :, :2] == face.ends[1]).all(axis=2).astype(np.int64), face.corners[:, :, 2]], axis=2)
+        for _, face in faces
+    ]
+    face, bands = tiles(outline(np.concatenate([np.zeros((0, 3, 2), np.int64), *flat]), owner, len(faces)), 1)
+    whole = (bands[:, 0, 0] == 0) & (bands[:, 1, 0] == 1)
+    face, bands = face[whole], bands[whole][:, :, 1].astype(np.int64)
+    quads = np.empty((len(face), 2, 3))
+    quads[:, :, 2] = bands
+    for row, place in enumerate(face.tolist()):
+        along, length = faces[place][1].along
+        short = min(SHORT, length / 4) * along
+        quads[row, :, :2] = faces[place][1].ends + np.array([short, -short])
+        quads[row, :, :2] += BESIDE * np.array([-along[1], along[0]])
+    # Elements in the order in which faces name them.
+    numbers, of = np.unique([object_id for object_id, _ in faces], return_inverse=True)
+    order = np.argsort(of[face], kind="stable")
+    held = np.zeros(len(face), bool)
+    held[order] = inside(quads[order], of[face][order], [solids[number] for number in numbers.tolist()], BESIDE / 2)
+    failed = np.zeros(len(faces), bool)
+    failed[face[~held]] = True
+    ends = np.searchsorted(face, np.arange(len(faces) + 1))
+    return [None if failed[place] else bands[ends[place] : ends[place + 1]] for place in range(len(faces))]
 
 
 def _fills(bands: list[np.ndarray], face: UprightFace) -> bool:

@@ -7,7 +7,7 @@ around them are conservative.
 
 from dataclasses import dataclass
 from hashlib import sha256
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -195,66 +195,85 @@ def _cut_turned(
     triangles: np.ndarray, owners: np.ndarray, yaw: np.ndarray, least: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pieces of objects in their own frames: corners of each plan, z low and high in turn, shape (n, 4, 3); objects."""
-    corners, owner = [np.zeros((0, 4, 3), np.int64)], [np.zeros(0, np.int64)]
-    for number in np.unique(owners):
-        own = triangles[owners == number].astype(np.int64)
+    numbers = np.unique(owners)
+    starts = np.searchsorted(owners, [*numbers.tolist(), len(yaw)])
+    bases, levels = np.zeros((len(numbers), 3), np.int64), np.empty(triangles.shape, np.int64)
+    for place, (first, stop) in enumerate(pairwise(starts.tolist())):
+        own = triangles[first:stop].astype(np.int64)
         # Cut about its own corner, so that what is alike is cut alike.
-        base = own.min(axis=(0, 1))
-        own -= base
-        level = np.round(turned(own.astype(float), -yaw[number])).astype(np.int64)
-        bounds = np.array([[level.min(axis=(0, 1)), level.max(axis=(0, 1))]])
-        boxes, _ = _cut(level, np.zeros(len(own), np.int64), bounds, least)
-        corners.append(np.array([_tight_plan(own, box, yaw[number]) for box in boxes], np.int64) + base)
-        owner.append(np.full(len(boxes), number))
-    return np.concatenate(corners), np.concatenate(owner)
+        bases[place] = own.min(axis=(0, 1))
+        levels[first:stop] = np.round(turned((own - bases[place]).astype(float), -yaw[numbers[place]]))
+    places = np.repeat(np.arange(len(numbers)), np.diff(starts))
+    boxes, place = _cut(levels, places, bounds_by_owner(levels, places, len(numbers)), least)
+    ends = np.searchsorted(place, np.arange(len(numbers) + 1))
+    corners = [np.zeros((0, 4, 3), np.int64)]
+    for number in range(len(numbers)):
+        own = triangles[starts[number] : starts[number + 1]].astype(np.int64) - bases[number]
+        mine = boxes[ends[number] : ends[number + 1]]
+        corners.append(_tight_plans(own, mine, yaw[numbers[number]]) + bases[number])
+    return np.concatenate(corners), numbers[place]
 
 
-def _tight_plan(triangles: np.ndarray, box: np.ndarray, yaw_deg: float) -> np.ndarray:
-    """Corners of an upright prism that holds what lies of the triangles in a box of a turned frame, shape (4, 3).
+def _tight_plans(triangles: np.ndarray, boxes: np.ndarray, yaw_deg: float) -> np.ndarray:
+    """Upright prisms that hold what lies of the triangles in boxes of a turned frame: corners, shape (n, 4, 3), int64.
 
-    Its corners are those of the object where it has some there: what is a step larger sticks out of the wall that the
+    Their corners are those of the object where it has some there: what is a step larger sticks out of the wall that the
     object ends in.
     """
-    frame = box_corners(box + np.array([[-ROUNDING], [ROUNDING]]))
-    wide = np.round(turned_plan(frame.astype(float), yaw_deg)).astype(np.int64)
+    frame = box_corners(boxes + np.array([[-ROUNDING], [ROUNDING]])).astype(float)
+    wide = np.round(turned_plan(frame.reshape(-1, 2), yaw_deg)).astype(np.int64).reshape(-1, 4, 2)
     vertices = np.unique(triangles.reshape(-1, 3)[:, :2], axis=0)
-    points = _plan_points(triangles, box[:, :2] + np.array([[-1], [1]]), yaw_deg)
-    away = np.abs(vertices[None] - wide[:, None]).max(axis=2)
-    nearest = away.argmin(axis=1)
-    tight = away.min(axis=1) <= 2 * ROUNDING + 1
-    for chosen in (tight & np.array(some) for some in FEWER_CORNERS):
-        plan = np.where(chosen[:, None], vertices[nearest], wide)
-        if not are_convex(plan):
-            continue
-        along, rest = np.roll(plan, -1, axis=0) - plan, points[:, None] - plan
-        inward = along[:, 0] * rest[:, :, 1] - along[:, 1] * rest[:, :, 0]
-        if (inward >= -1e-6 * np.abs(along).sum(axis=1)).all():
+    row, points = _plan_points(triangles, boxes[:, :, :2] + np.array([[-1], [1]]), yaw_deg)
+    away = np.abs(vertices - wide[:, :, None]).max(axis=3)
+    nearest = vertices[away.argmin(axis=2)]
+    tight = away.min(axis=2) <= 2 * ROUNDING + 1
+    plans, left = wide.copy(), np.ones(len(boxes), bool)
+    for some in FEWER_CORNERS:
+        plan = np.where((tight & np.array(some))[:, :, None], nearest, wide)
+        held = are_convex(plan)
+        along, rest = np.roll(plan, -1, axis=1) - plan, points[:, None] - plan[row]
+        inward = along[row, :, 0] * rest[:, :, 1] - along[row, :, 1] * rest[:, :, 0]
+        held[row[(inward < -1e-6 * np.abs(along).sum(axis=2)[row]).any(axis=1)]] = False
+        plans[left & held] = plan[left & held]
+        left &= ~held
+        if not left.any():
             break
-    return np.column_stack([plan, box[[0, 0, 1, 1], 2]])
+    heights = boxes[:, [0, 0, 1, 1], 2]
+    return np.concatenate([plans, heights[:, :, None]], axis=2)
 
 
-def _plan_points(triangles: np.ndarray, rectangle: np.ndarray, yaw_deg: float) -> np.ndarray:
-    """Points whose convex hull holds the triangles' plan inside a rectangle (low, high) of a turned frame, (n, 2)."""
+def _plan_points(triangles: np.ndarray, rectangles: np.ndarray, yaw_deg: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points whose convex hulls hold the triangles' plan inside rectangles (n, 2, 2) of a turned frame.
+
+    Returns:
+        Rectangle of each point, shape (m,), and points in the model's own frame, shape (m, 2).
+    """
     flat = turned(triangles.astype(float), -yaw_deg)[:, :, :2]
-    low, high = rectangle.astype(float)
-    near = ((flat.min(axis=1) <= high) & (flat.max(axis=1) >= low)).all(axis=1)
-    flat, own = flat[near], triangles[near].reshape(-1, 3)[:, :2].astype(float)
-    inside = ((flat >= low) & (flat <= high)).all(axis=2).ravel()
-    crossings = []
+    near = (flat.min(axis=1) <= rectangles[:, None, 1]) & (flat.max(axis=1) >= rectangles[:, None, 0])
+    row, which = np.nonzero(near.all(axis=2))
+    flat, own = flat[which], triangles[which][:, :, :2].astype(float)
+    low, high = rectangles[row].astype(float).transpose(1, 0, 2)
+    inside = ((flat >= low[:, None]) & (flat <= high[:, None])).all(axis=2)
+    rows, found, owners, crossings = [np.nonzero(inside)[0]], [own[inside]], [], []
     edges = np.roll(flat, -1, axis=1) - flat
     for axis in (0, 1):
-        for border in (low[axis], high[axis]):
+        for border in (low[:, None, axis], high[:, None, axis]):
             rise = edges[:, :, axis]
             share = np.divide(border - flat[:, :, axis], rise, out=np.full(rise.shape, -1.0), where=rise != 0)
             point = flat + share[:, :, None] * edges
-            held = (share >= 0) & (share <= 1) & (point >= low - 1).all(axis=2) & (point <= high + 1).all(axis=2)
+            held = (share >= 0) & (share <= 1)
+            held &= ((point >= low[:, None] - 1) & (point <= high[:, None] + 1)).all(axis=2)
             crossings.append(point[held])
+            owners.append(np.nonzero(held)[0])
     # Corners of the rectangle that a triangle lies under or over.
-    corners = box_corners(np.array([low, high]))
-    rest = corners[:, None, None] - flat
-    turn = edges[:, :, 0] * rest[..., 1] - edges[:, :, 1] * rest[..., 0]
-    crossings.append(corners[((turn >= 0).all(axis=2) | (turn <= 0).all(axis=2)).any(axis=1)])
-    return np.concatenate([own[inside], turned_plan(np.concatenate(crossings), yaw_deg)])
+    corners = box_corners(np.stack([low, high], axis=1))
+    rest = corners[:, :, None] - flat[:, None]
+    turn = edges[:, None, :, 0] * rest[..., 1] - edges[:, None, :, 1] * rest[..., 0]
+    over = (turn >= 0).all(axis=2) | (turn <= 0).all(axis=2)
+    crossings.append(corners[over])
+    owners.append(np.nonzero(over)[0])
+    found.append(turned_plan(np.concatenate(crossings), yaw_deg))
+    return row[np.concatenate(rows + owners)], np.concatenate(found)
 
 
 def _models(triangles: np.ndarray, owners: np.ndarray, bounds: np.ndarray) -> np.ndarray:

@@ -15,12 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .blockers import Blockers
-from .curtains import LEAST_M2, NEAR_DEG, THIN_M, cuts_inside, face_normals, inside, largest_sections
+from .curtains import LEAST_M2, NEAR_DEG, THIN_M, cuts_inside, face_normals, inside, lots_of
 from .frame import LEAST_DEG
 from .graph import OTHER_AXES
 from .occludees import Occludees, turned_occludees
 from .plans import Plans, box_corners, plan_bounds, turned_plan
 from .scene import GRID_LIMIT, OPAQUE, Scene, turned
+from .sections import Cut, largest_sections, over
 from .solids import winding_numbers
 
 # The box around a cell's plan in its frame is wider than the plan by no more than this on every side [grid steps].
@@ -137,32 +138,42 @@ def _walls(elements: list[np.ndarray], yaw: float, grid_m: float) -> Blockers:
     """Axial rectangles of a turned frame inside closed elements whose faces stand along it."""
     least, thin = LEAST_M2 / grid_m**2, THIN_M / grid_m
     boxes, axes = [np.zeros((0, 2, 3), np.int64)], [np.zeros(0, np.int64)]
-    for triangles in elements:
-        flat = turned(triangles.astype(float), -yaw)
-        level = np.round(flat).astype(np.int64)
-        along = _faces_along(flat, least)
-        for axis in range(2) if any(len(faces) for faces in along) else ():
-            low, high = level[:, :, axis].min(axis=1), level[:, :, axis].max(axis=1)
-            depths = flat[along[axis]][:, :, axis].mean(axis=1)
-            for k in cuts_inside(depths, int(low.min()), int(high.max()), thin, RECESS) if len(depths) else ():
-                found = largest_sections(level[(low < k) & (high >= k)], axis, k, (ENDS, 0), least)
-                found = _flat_boxes(found, axis, k)
-                _enter(boxes, axes, axis, found[inside(turned(found.astype(float), yaw), triangles, CLEAR_STEPS)])
-        if any(len(faces) for faces in along):
-            for k, found in _levels(flat, level, least):
-                _enter(boxes, axes, 2, _flat_boxes(found, 2, k))
+    for lot in lots_of(elements):
+        along: list[list[Cut]] = [[], []]
+        owners: list[list[int]] = [[], []]
+        levels: list[Cut] = []
+        flats: list[np.ndarray] = []
+        for number, triangles in enumerate(lot):
+            flat = turned(triangles.astype(float), -yaw)
+            faces = _faces_along(flat, least)
+            if not any(len(part) for part in faces):
+                continue
+            level = np.round(flat).astype(np.int64)
+            for axis in range(2):
+                low, high = int(level[:, :, axis].min()), int(level[:, :, axis].max())
+                depths = flat[faces[axis]][:, :, axis].mean(axis=1)
+                for k in cuts_inside(depths, low, high, thin, RECESS) if len(depths) else ():
+                    along[axis].append(over(level, axis, k))
+                    owners[axis].append(number)
+            own = _levels(flat, level)
+            levels += own
+            flats += [flat] * len(own)
+        for axis in range(2):
+            cut, found = largest_sections(along[axis], np.tile([ENDS, 0], (len(along[axis]), 1)), least)
+            plane = np.array([section.plane for section in along[axis]], np.int64)[cut]
+            found = _flat_boxes(found, axis, plane)
+            owner = np.array(owners[axis], np.int64)[cut]
+            boxes.append(found[inside(turned(found.astype(float), yaw), owner, lot, CLEAR_STEPS)])
+            axes.append(np.full(len(boxes[-1]), axis))
+        boxes.append(_level_boxes(levels, flats, least))
+        axes.append(np.full(len(boxes[-1]), 2))
     joined = np.concatenate(boxes).astype(np.int32)
     return Blockers(joined, np.concatenate(axes).astype(np.int32))
 
 
-def _enter(boxes: list[np.ndarray], axes: list[np.ndarray], axis: int, found: np.ndarray) -> None:
-    boxes.append(found)
-    axes.append(np.full(len(found), axis))
-
-
-def _flat_boxes(rectangles: np.ndarray, axis: int, k: int) -> np.ndarray:
-    """Rectangles (n, 2, 2) of a plane as flat boxes, shape (n, 2, 3), int64."""
-    boxes = np.full((len(rectangles), 2, 3), k, np.int64)
+def _flat_boxes(rectangles: np.ndarray, axis: int, planes: np.ndarray) -> np.ndarray:
+    """Rectangles (n, 2, 2) of planes as flat boxes, shape (n, 2, 3), int64."""
+    boxes = np.repeat(planes[:, None], 6, axis=1).reshape(-1, 2, 3)
     boxes[:, :, OTHER_AXES[axis]] = rectangles
     return boxes
 
@@ -178,16 +189,12 @@ def _faces_along(flat: np.ndarray, least: float) -> list[np.ndarray]:
     return found
 
 
-def _levels(flat: np.ndarray, level: np.ndarray, least: float) -> list[tuple[int, np.ndarray]]:
-    """Rectangles inside an element just below its tops and just above its bottoms, where its sides are upright.
+def _levels(flat: np.ndarray, level: np.ndarray) -> list[Cut]:
+    """Sections of an element just below its tops and just above its bottoms, where its sides are upright.
 
     Args:
         flat: triangles of the closed element in the frame, unrounded but for their heights, shape (m, 3, 3), float64.
         level: the same, rounded, int64.
-        least: smaller rectangles are left out [squared grid steps].
-
-    Returns:
-        Height, and rectangles (n, 2, 2), int64, of each.
     """
     low, high = level[:, :, 2].min(axis=1), level[:, :, 2].max(axis=1)
     _, _, upright = face_normals(flat)
@@ -195,19 +202,34 @@ def _levels(flat: np.ndarray, level: np.ndarray, least: float) -> list[tuple[int
     for below, heights in ((True, high), (False, low)):
         for k in np.unique(heights[low == high]).tolist():
             cut = (low < k) & (high >= k) if below else (low <= k) & (high > k)
-            if not upright[cut].all():
-                continue
-            rectangles = largest_sections(level[cut], 2, k, (ENDS, ENDS), least, below=below)
-            # The sides stand over plan boxes; none comes near the inside of a rectangle.
-            sides = np.stack([flat[cut][:, :, :2].min(axis=1), flat[cut][:, :, :2].max(axis=1)], axis=1)
-            near = (sides[None, :, 0] < rectangles[:, None, 1] + CLEAR_STEPS) & (
-                sides[None, :, 1] > rectangles[:, None, 0] - CLEAR_STEPS
-            )
-            rectangles = rectangles[~near.all(axis=2).any(axis=1)]
-            middles = np.column_stack(
-                [rectangles.mean(axis=1), np.full(len(rectangles), k - 0.5 if below else k + 0.5)]
-            )
-            rectangles = rectangles[np.abs(winding_numbers(middles, flat)) > 0.5]
-            if len(rectangles):
-                found.append((k, rectangles))
+            if upright[cut].all():
+                found.append(Cut(level[cut], 2, k, below))
     return found
+
+
+def _level_boxes(cuts: list[Cut], flats: list[np.ndarray], least: float) -> np.ndarray:
+    """Flat boxes inside sections of `_levels`, shape (n, 2, 3), int64.
+
+    Args:
+        cuts: sections.
+        flats: unrounded triangles of the element of each.
+        least: smaller rectangles are left out [squared grid steps].
+    """
+    cut, rectangles = largest_sections(cuts, np.full((len(cuts), 2), ENDS), least)
+    found = [np.zeros((0, 2, 3), np.int64)]
+    for number in np.unique(cut).tolist():
+        section, flat = cuts[number], flats[number]
+        mine, below = rectangles[cut == number], section.below
+        # The sides stand over plan boxes; none comes near the inside of a rectangle.
+        low, high = flat[:, :, 2].min(axis=1), flat[:, :, 2].max(axis=1)
+        k = section.plane
+        sides = flat[(low < k) & (high >= k) if below else (low <= k) & (high > k)][:, :, :2]
+        sides = np.stack([sides.min(axis=1), sides.max(axis=1)], axis=1)
+        near = (sides[None, :, 0] < mine[:, None, 1] + CLEAR_STEPS) & (
+            sides[None, :, 1] > mine[:, None, 0] - CLEAR_STEPS
+        )
+        mine = mine[~near.all(axis=2).any(axis=1)]
+        middles = np.column_stack([mine.mean(axis=1), np.full(len(mine), k - 0.5 if below else k + 0.5)])
+        mine = mine[np.abs(winding_numbers(middles, flat)) > 0.5]
+        found.append(_flat_boxes(mine, 2, np.full(len(mine), k)))
+    return np.concatenate(found)

@@ -3,10 +3,18 @@
 Source: Funkhouser et al. 1996, section 3.1 (portals are the transparent parts of shared boundaries).
 """
 
+from collections.abc import Callable
+from itertools import pairwise
+
 import numpy as np
 
 from .graph import OTHER_AXES, CellGraph
-from .opaque import OpaquePlanes, decompose
+from .opaque import OpaquePlanes
+from .ragged import places_of
+from .rasters import Rasters
+
+# Pairs of cells that are looked at together.
+PAIRS = 1_000_000
 
 
 def find_portals(cells: np.ndarray, opaque: OpaquePlanes) -> CellGraph:
@@ -19,61 +27,86 @@ def find_portals(cells: np.ndarray, opaque: OpaquePlanes) -> CellGraph:
     Returns:
         The graph, with no cell marked inhabitable and empty names.
     """
-    planes = opaque.index
+    index = opaque.index
     ends, axes, boxes = [], [], []
     for axis in range(3):
-        u, v = OTHER_AXES[axis]
-        for low, high, shared in shared_faces(cells, axis):
-            k = int(cells[low, 1, axis])
-            for rectangle in open_rectangles(shared, planes.rectangles(axis, k)):
-                box = np.full((2, 3), k, np.int32)
-                box[:, u], box[:, v] = rectangle[:, 0], rectangle[:, 1]
-                ends.append((low, high))
-                axes.append(axis)
-                boxes.append(box)
+        pairs, faces = shared_faces(cells, axis)
+        planes = cells[pairs[:, 0], 1, axis]
+        face, rectangles = open_rectangles(faces, planes, lambda k, axis=axis: index.rectangles(axis, k))
+        flat = np.repeat(planes[face, None], 6, axis=1).reshape(-1, 2, 3)
+        flat[:, :, OTHER_AXES[axis]] = rectangles
+        ends.append(pairs[face])
+        axes.append(np.full(len(face), axis))
+        boxes.append(flat)
     return CellGraph(
         cells,
         np.zeros(len(cells), bool),
         np.full(len(cells), "", object),
-        np.array(ends, np.int32).reshape(-1, 2),
-        np.array(axes, np.int8),
-        np.array(boxes, np.int32).reshape(-1, 2, 3),
+        np.concatenate(ends).astype(np.int32),
+        np.concatenate(axes).astype(np.int8),
+        np.concatenate(boxes).astype(np.int32),
     )
 
 
-def shared_faces(cells: np.ndarray, axis: int) -> list[tuple[int, int, np.ndarray]]:
-    """Pairs (low cell, high cell, shared rectangle (2, 2) in u, v) that touch with positive area on an axis."""
-    u, v = OTHER_AXES[axis]
-    by_low = np.argsort(cells[:, 0, axis], kind="stable")
-    lows = cells[by_low, 0, axis]
-    found = []
-    for k in np.unique(cells[:, 1, axis]):
-        behind = by_low[np.searchsorted(lows, k) : np.searchsorted(lows, k, side="right")]
-        for low in np.flatnonzero(cells[:, 1, axis] == k) if len(behind) else ():
-            corner_low = np.maximum(cells[low, 0], cells[behind, 0])
-            corner_high = np.minimum(cells[low, 1], cells[behind, 1])
-            for n in np.flatnonzero((corner_high[:, u] > corner_low[:, u]) & (corner_high[:, v] > corner_low[:, v])):
-                found.append(
-                    (int(low), int(behind[n]), np.array([corner_low[n][[u, v]], corner_high[n][[u, v]]], np.int64))
-                )
-    return found
+def shared_faces(cells: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of cells that touch with positive area on an axis.
+
+    Returns:
+        The cell below and the cell above, shape (n, 2), ordered by their common plane; and the rectangle that they
+        share, low and high corner in u and v, shape (n, 2, 2), int64.
+    """
+    uv = OTHER_AXES[axis]
+    by_low, below = (np.argsort(cells[:, side, axis], kind="stable") for side in (0, 1))
+    begin, end = (np.searchsorted(cells[by_low, 0, axis], cells[below, 1, axis], side) for side in ("left", "right"))
+    pairs, faces = [np.zeros((0, 2), np.int64)], [np.zeros((0, 2, 2), np.int64)]
+    # Cells of one storey make many pairs that touch in one plane, far apart.
+    total = np.cumsum(end - begin)
+    for lot in np.split(np.arange(len(below)), np.flatnonzero(np.diff(total // PAIRS)) + 1):
+        times = (end - begin)[lot]
+        low, high = np.repeat(below[lot], times), by_low[places_of(begin[lot], times)]
+        corner_low = np.maximum(cells[low, 0], cells[high, 0])[:, uv]
+        corner_high = np.minimum(cells[low, 1], cells[high, 1])[:, uv]
+        touch = (corner_high > corner_low).all(axis=1)
+        pairs.append(np.column_stack([low, high])[touch])
+        faces.append(np.stack([corner_low, corner_high], axis=1)[touch].astype(np.int64))
+    return np.concatenate(pairs), np.concatenate(faces)
 
 
-def open_rectangles(face: np.ndarray, opaque: np.ndarray) -> np.ndarray:
-    """Face minus opaque rectangles, cut into disjoint rectangles; shape (n, 2, 2), int32.
+def open_rectangles(
+    faces: np.ndarray, planes: np.ndarray, opaque: Callable[[int], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Faces minus opaque rectangles, cut into disjoint rectangles.
 
     Args:
-        face: low and high corner (u, v), shape (2, 2).
-        opaque: rectangles of the same plane, shape (m, 2, 2).
+        faces: low and high corners (u, v), shape (n, 2, 2), int64.
+        planes: coordinate of each, ascending, shape (n,).
+        opaque: rectangles of a plane, shape (m, 2, 2).
+
+    Returns:
+        Face of each rectangle, ascending, shape (k,), and its corners, shape (k, 2, 2), int32.
     """
-    low, high = np.maximum(opaque[:, 0], face[0]), np.minimum(opaque[:, 1], face[1])
-    keep = (high > low).all(axis=1)
-    low, high = low[keep], high[keep]
-    if not len(low):
-        return face[None].astype(np.int32)
-    us = np.unique(np.concatenate([face[:, 0], low[:, 0], high[:, 0]]))
-    vs = np.unique(np.concatenate([face[:, 1], low[:, 1], high[:, 1]]))
-    mask = np.ones((len(us) - 1, len(vs) - 1), bool)
-    for (u0, v0), (u1, v1) in zip(low, high, strict=True):
-        mask[us.searchsorted(u0) : us.searchsorted(u1), vs.searchsorted(v0) : vs.searchsorted(v1)] = False
-    return decompose(mask, us, vs)
+    face, covers = [np.zeros(0, np.int64)], [np.zeros((0, 2, 2), np.int64)]
+    starts = np.append(np.flatnonzero(np.diff(planes, prepend=np.iinfo(np.int64).min)), len(planes))
+    for begin, end in pairwise(starts.tolist()):
+        rectangles = opaque(int(planes[begin]))
+        step = max(1, PAIRS // max(1, len(rectangles)))
+        for first in range(begin, end, step):
+            mine = faces[first : min(first + step, end)]
+            low = np.maximum(rectangles[None, :, 0], mine[:, None, 0])
+            high = np.minimum(rectangles[None, :, 1], mine[:, None, 1])
+            row, which = np.nonzero((high > low).all(axis=2))
+            face.append(first + row)
+            covers.append(np.stack([low[row, which], high[row, which]], axis=1))
+    face, covers = np.concatenate(face), np.concatenate(covers)
+    every = np.arange(len(faces))
+    points = [
+        [(np.repeat(every, 2), faces[:, :, c].ravel()), (np.repeat(face, 2), covers[:, :, c].ravel())] for c in (0, 1)
+    ]
+    owners, found = [np.zeros(0, np.int64)], [np.zeros((0, 2, 2), np.int32)]
+    for first, rasters in Rasters.of(points, len(faces)).lots():
+        a, b = np.searchsorted(face, [first, first + len(rasters)])
+        solid = rasters.paint(face[a:b] - first, covers[a:b])
+        owner, rectangles = rasters.tile(~solid & (rasters.area > 0))
+        owners.append(owner + first)
+        found.append(rectangles)
+    return np.concatenate(owners), np.concatenate(found)

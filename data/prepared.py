@@ -14,7 +14,7 @@ from .curtains import find_curtains
 from .exposed import exposed_faces
 from .graph import CellGraph
 from .occludees import Occludees, find_occludees
-from .opaque import NO_PLANES, OpaquePlanes, carved_planes, opaque_planes
+from .opaque import OpaquePlanes, carved_planes, opaque_planes
 from .patches import Patches, find_patches, join_outlines, rectangle_outlines
 from .regions import Regions, find_regions
 from .room_cells import find_room_points
@@ -143,11 +143,6 @@ class PreparedModel:
     def blockers(self, graph: CellGraph) -> Blockers:
         """What no sightline between live cells of a cell-and-portal graph of the model crosses."""
         return find_blockers(graph, self.blocking_planes)
-
-
-def no_regions() -> Regions:
-    """Regions of nothing."""
-    return find_regions(NO_PLANES, [], [], 1.0)
 
 
 def no_patches() -> Patches:

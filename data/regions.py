@@ -6,14 +6,19 @@ the gaps that walls leave in each other's faces and merges what a model keeps ap
 wall that a person sees. Open, inverted or doubled meshes give no section; they lose occlusion, never safety.
 """
 
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy import ndimage
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
-from .blockers import Blockers, maximal_rectangles, paint
+from .blockers import Blockers
 from .graph import OTHER_AXES
-from .opaque import OpaquePlanes, edge_rectangles
+from .opaque import OpaquePlanes
+from .ragged import places_of, starts_of
+from .rasters import Rasters
+from .sections import Cut, section_rectangles
 
 # Regions and pieces of furniture below this hide little and would fill the hierarchy.
 LEAST_M2 = 0.5
@@ -21,10 +26,6 @@ LEAST_M2 = 0.5
 THIN_M = 0.6
 # A closed element with oblique faces is cut only where it is so large: its sections break into many rectangles.
 ROUND_M2 = 2.0
-# Steps of the staircase along an oblique outline of a section.
-SECTION_STEPS = 4
-# Steps along an outline on a level: slabs of turned wings reach to the middle of the walls on them.
-LEVEL_STEPS = 24
 # Normals that rise, or lean off an axis, by less than this do not count.
 UPRIGHT = 1e-3
 # An oblique section of more triangles than this is left out: it costs more than it hides.
@@ -75,72 +76,123 @@ def find_regions(
     least = LEAST_M2 / grid_m**2
     elements = _Sections(occluders, details, least, ROUND_M2 / grid_m**2)
     index = opaque.index
-    found = []
+    axes, planes, owners, found = [], [], [], []
     for axis in range(3):
-        uv = OTHER_AXES[axis]
-        extent = (opaque.boxes[axis][:, 1] - opaque.boxes[axis][:, 0]).astype(float)[:, uv]
-        planes, place = np.unique(opaque.boxes[axis][:, 0, axis], return_inverse=True)
-        area = np.bincount(place, extent.prod(axis=1), minlength=len(planes))
+        extent = (opaque.boxes[axis][:, 1] - opaque.boxes[axis][:, 0]).astype(float)[:, OTHER_AXES[axis]]
+        every, place = np.unique(opaque.boxes[axis][:, 0, axis], return_inverse=True)
+        area = np.bincount(place, extent.prod(axis=1), minlength=len(every))
         middles = elements.middles(axis, round(THIN_M / grid_m))
-        for k in np.unique(np.concatenate([planes[area >= least], middles])):
-            rectangles = np.concatenate([index.rectangles(axis, int(k)), elements.rectangles(axis, int(k))])
-            for region in _plane_regions(rectangles, least):
-                found.append((axis, int(k), *region))
-    return _pack(found)
+        wanted = np.unique(np.concatenate([every[area >= least], middles])).astype(np.int64)
+        surface = [index.rectangles(axis, k) for k in wanted.tolist()]
+        place, sections = elements.rectangles(axis, wanted)
+        place = np.concatenate([np.repeat(np.arange(len(wanted)), [len(part) for part in surface]), place])
+        owners.append(place + sum(map(len, planes)))
+        found += [*surface, sections]
+        axes.append(np.full(len(wanted), axis, np.int32))
+        planes.append(wanted.astype(np.int32))
+    owner, rectangles = np.concatenate(owners), np.concatenate([np.zeros((0, 2, 2), np.int64), *found])
+    return _connected(owner, rectangles, np.concatenate(axes), np.concatenate(planes), least)
 
 
-def _plane_regions(rectangles: np.ndarray, least: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Connected parts of a union of rectangles: u, v, covered raster cells, and maximal rectangles of each."""
-    if not len(rectangles):
-        return []
-    us, vs = np.unique(rectangles[:, :, 0]), np.unique(rectangles[:, :, 1])
-    covered = paint(rectangles, us, vs)
-    labels, _ = ndimage.label(covered)
-    found = []
-    for label, window in enumerate(ndimage.find_objects(labels), start=1):
-        own = labels[window] == label
-        u = us[window[0].start : window[0].stop + 1]
-        v = vs[window[1].start : window[1].stop + 1]
-        if (own * np.outer(np.diff(u), np.diff(v)).astype(float)).sum() < least:
-            continue
-        # Raster lines that separate equal rows belong to other regions of the plane.
-        rows = np.concatenate([[True], (own[1:] != own[:-1]).any(axis=1), [True]])
-        columns = np.concatenate([[True], (own[:, 1:] != own[:, :-1]).any(axis=0), [True]])
-        own = own[rows[:-1]][:, columns[:-1]]
-        u, v = u[rows], v[columns]
-        whole = own.shape == (1, 1)
-        rectangles = np.stack([u, v], axis=1)[None] if whole else maximal_rectangles(own, own, u, v)
-        found.append((u, v, own, rectangles.astype(np.int32)))
-    return found
+def _connected(
+    owner: np.ndarray, rectangles: np.ndarray, axes: np.ndarray, planes: np.ndarray, least: float
+) -> Regions:
+    """Connected parts of unions of rectangles of planes, and maximal rectangles of each.
+
+    Args:
+        owner: plane of each rectangle, shape (n,).
+        rectangles: shape (n, 2, 2), int64.
+        axes: of each plane, shape (planes,), int32.
+        planes: coordinates, likewise.
+        least: smaller parts are left out [squared grid steps].
+    """
+    order = np.argsort(owner, kind="stable")
+    owner, rectangles = owner[order], rectangles[order]
+    points = [[(np.repeat(owner, 2), rectangles[:, :, c].ravel())] for c in (0, 1)]
+    found = [no_regions()]
+    for first, rasters in Rasters.of(points, len(planes)).lots():
+        a, b = np.searchsorted(owner, [first, first + len(rasters)])
+        covered = rasters.paint(owner[a:b] - first, rectangles[a:b])
+        plane, own, mask = _parts(rasters, covered, least)
+        found.append(_regions(axes[first + plane], planes[first + plane], own, mask))
+    return _joined(found)
 
 
-def _pack(found: list[tuple]) -> Regions:
-    axis = np.array([part[0] for part in found], np.int32)
-    plane = np.array([part[1] for part in found], np.int32)
-    sizes = np.array([[len(u), len(v), len(u) * len(v)] for _, _, u, v, _, _ in found], np.int64).reshape(-1, 3)
-    places = np.concatenate([np.zeros((1, 3), np.int64), np.cumsum(sizes, axis=0)])
-    tables = []
-    for _, _, u, v, covered, _ in found:
-        table = np.zeros((len(u), len(v)), np.int32)
-        table[1:, 1:] = (~covered).cumsum(axis=0).cumsum(axis=1)
-        tables.append(table.ravel())
-    boxes = [np.zeros((0, 2, 3), np.int32)]
-    for part_axis, k, _, _, _, rectangles in found:
-        flat = np.full((len(rectangles), 2, 3), k, np.int32)
-        flat[:, :, OTHER_AXES[part_axis]] = rectangles
-        boxes.append(flat)
-    joined = np.concatenate(boxes)
-    empty = np.zeros(0, np.int32)
-    return Regions(
-        axis,
-        plane,
-        places,
-        np.concatenate([empty, *(part[2] for part in found)]).astype(np.int32),
-        np.concatenate([empty, *(part[3] for part in found)]).astype(np.int32),
-        np.concatenate([empty, *tables]).astype(np.int32),
-        joined,
-        np.repeat(np.arange(len(found), dtype=np.int32), [len(part[5]) for part in found]),
-    )
+def _parts(rasters: Rasters, covered: np.ndarray, least: float) -> tuple[np.ndarray, Rasters, np.ndarray]:
+    """Connected parts of what rasters cover: raster of each part, and its own raster and covered cells."""
+    owner, row, first, last = rasters.strips(covered, 1)
+    strips = np.arange(len(owner))
+    # Runs of the next row that share a column: from the first that ends beyond the run's begin, to the last that
+    # begins before its end.
+    begin, end = rasters.node(owner, row, first), rasters.node(owner, row, last)
+    wide = rasters.sizes[1][owner]
+    low, high = np.searchsorted(end, begin + wide, side="right"), np.searchsorted(begin, end + wide)
+    one, other = np.repeat(strips, np.maximum(high - low, 0)), places_of(low, np.maximum(high - low, 0))
+    graph = coo_matrix((np.ones(len(one), np.int8), (one, other)), (len(strips),) * 2)
+    count, part = connected_components(graph, directed=False)
+    # In the order of their first cells; small ones have no number.
+    head = np.full(count, len(strips))
+    np.minimum.at(head, part, strips)
+    sides = [rasters.at(axis, owner, line) for axis, line in ((0, row), (0, row + 1), (1, first), (1, last))]
+    area = np.bincount(part, ((sides[1] - sides[0]) * (sides[3] - sides[2])).astype(float), minlength=count)
+    order = np.argsort(head)
+    order = order[area[order] >= least]
+    number = np.full(count, -1)
+    number[order] = np.arange(len(order))
+    part = number[part]
+    # Raster lines that separate equal rows belong to other parts of the plane: a row begins or ends with a run unless
+    # one of the row beside it holds all of the run.
+    within = (begin[other] - wide[other] >= begin[one]) & (end[other] - wide[other] <= end[one])
+    around = (begin[other] - wide[other] <= begin[one]) & (end[other] - wide[other] >= end[one])
+    begins, ends = np.ones(len(strips), bool), np.ones(len(strips), bool)
+    begins[other[within]] = False
+    ends[one[around]] = False
+    kept = part >= 0
+    points = [
+        [(part[kept & begins], sides[0][kept & begins]), (part[kept & ends], sides[1][kept & ends])],
+        [(part[kept], sides[2][kept]), (part[kept], sides[3][kept])],
+    ]
+    own = Rasters.of(points, len(order))
+    of, rectangles = rasters.tile(covered)
+    corner = rasters.node(of, *(rasters.find(axis, of, rectangles[:, 0, axis]) for axis in (0, 1)))
+    mine = part[np.searchsorted(begin, corner, side="right") - 1]
+    return owner[head[order]], own, own.paint(mine[mine >= 0], rectangles[mine >= 0])
+
+
+def _regions(axis: np.ndarray, plane: np.ndarray, rasters: Rasters, covered: np.ndarray) -> Regions:
+    """Regions of what each raster covers."""
+    opened = rasters.sum_along(rasters.sum_along(~covered & (rasters.area > 0), 0), 1)
+    before = np.zeros(len(covered), np.int32)
+    cells = np.flatnonzero(rasters.area > 0)
+    before[cells + rasters.sizes[1][rasters.owner[cells]] + 1] = opened[cells]
+    region, rectangles = rasters.maximal(covered, covered)
+    boxes = np.repeat(plane[region, None], 6, axis=1).reshape(-1, 2, 3)
+    for k in range(3):
+        mine = np.flatnonzero(axis[region] == k)
+        boxes[np.ix_(mine, [0, 1], OTHER_AXES[k])] = rectangles[mine]
+    places = np.stack([*rasters.starts, rasters.nodes], axis=1)
+    u, v = (at.astype(np.int32) for at in rasters.coordinates)
+    return Regions(axis, plane, places, u, v, before, boxes, region.astype(np.int32))
+
+
+def _joined(parts: list[Regions]) -> Regions:
+    """All of some regions, in order."""
+    places = np.concatenate([np.diff(part.places, axis=0) for part in parts])
+    places = np.concatenate([np.zeros((1, 3), np.int64), np.cumsum(places, axis=0)])
+    columns = {
+        field.name: np.concatenate([getattr(part, field.name) for part in parts])
+        for field in fields(Regions)
+        if field.name not in ("places", "region")
+    }
+    before = starts_of([len(part.axis) for part in parts])
+    region = [part.region + count for part, count in zip(parts, before[:-1], strict=True)]
+    return Regions(places=places, region=np.concatenate(region).astype(np.int32), **columns)
+
+
+def no_regions() -> Regions:
+    """Regions of nothing."""
+    boxes, places, empty = np.zeros((0, 2, 3), np.int32), np.zeros((1, 3), np.int64), np.zeros(0, np.int32)
+    return Regions(empty, empty, places, empty, empty, empty, boxes, empty)
 
 
 class _Sections:
@@ -169,7 +221,6 @@ class _Sections:
         self._middle = self._boxes.sum(axis=1) // 2
         self._heights: dict[tuple[int, int], np.ndarray] = {}
         self._cut: dict[tuple[int, int, int], tuple[np.ndarray, bool]] = {}
-        self._known: dict[tuple[int, int, int], np.ndarray] = {}
 
     def middles(self, axis: int, thin: int) -> np.ndarray:
         """Planes through the middle of thin elements and of those that are no boxes."""
@@ -178,44 +229,63 @@ class _Sections:
         wanted &= np.where(self._solid_box, size[:, axis] <= thin, self._large[:, axis])
         return np.unique(self._middle[wanted, axis])
 
-    def rectangles(self, axis: int, k: int) -> np.ndarray:
-        """Rectangles inside the sections just below and just above a plane, shape (n, 2, 2), int64."""
-        uv = OTHER_AXES[axis]
-        near = (self._boxes[:, 0, axis] <= k) & (self._boxes[:, 1, axis] >= k)
-        simple = near & self._solid_box
-        found = [self._boxes[simple][:, :, uv]]
-        for element in np.flatnonzero(near & ~self._solid_box & self._large[:, axis]):
-            low, high = self._boxes[element, :, axis]
-            if low < k:
-                found.append(self._section(int(element), axis, k, below=True))
-            if k < high:
-                found.append(self._section(int(element), axis, k, below=False))
-        return np.concatenate(found)
+    def rectangles(self, axis: int, planes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rectangles inside the sections just below and just above planes.
 
-    def _section(self, element: int, axis: int, k: int, *, below: bool) -> np.ndarray:
-        """Section just below or just above plane k."""
+        Args:
+            axis: perpendicular to the planes.
+            planes: coordinates, ascending, int64.
+
+        Returns:
+            Plane of each, shape (n,), and corners, shape (n, 2, 2), int64.
+        """
+        low, high = self._boxes[:, :, axis].T
+        begin, end = np.searchsorted(planes, low), np.searchsorted(planes, high, "right")
+        # Plane after plane, so that what is cut once is cut at the lowest of them.
+        place, element = places_of(begin, end - begin), np.repeat(np.arange(len(low)), end - begin)
+        order = np.argsort(place, kind="stable")
+        place, element = place[order], element[order]
+        simple = self._solid_box[element]
+        cuts: dict[tuple[int, int, int], Cut] = {}
+        wanted: dict[tuple[int, int, int], list[int]] = defaultdict(list)
+        for row in np.flatnonzero(~simple & self._large[element, axis]).tolist():
+            k, which = int(planes[place[row]]), int(element[row])
+            for below in (True, False):
+                if low[which] < k if below else k < high[which]:
+                    key = self._cut_at(cuts, (which, axis, k), below=below)
+                    if key is not None:
+                        wanted[key].append(int(place[row]))
+        cut, sections = section_rectangles([cuts[key] for key in wanted])
+        starts = np.searchsorted(cut, np.arange(len(wanted) + 1))
+        times = [len(places) for places in wanted.values()]
+        row = np.repeat(np.arange(len(wanted)), times)
+        at = np.repeat(np.array([k for places in wanted.values() for k in places], np.int64), np.diff(starts)[row])
+        oblique = sections[places_of(starts[row], np.diff(starts)[row])]
+        boxes = self._boxes[element[simple]][:, :, OTHER_AXES[axis]]
+        return np.concatenate([place[simple], at]), np.concatenate([boxes, oblique])
+
+    def _cut_at(
+        self, cuts: dict[tuple[int, int, int], Cut], where: tuple[int, int, int], *, below: bool
+    ) -> tuple[int, int, int] | None:
+        """Which section is the one of an element, axis and plane, entered if it is new; None if there is none.
+
+        What is cut, and whether it is a prism there, changes only where the element has a vertex: between two heights
+        of vertices a prism has one section. Walls are cut by hundreds of planes.
+        """
+        element, axis, k = where
         heights = self._vertex_heights(element, axis)
-        # What is cut, and whether it is a prism there, changes only where the element has a vertex.
         upper = int(heights[np.searchsorted(heights, k, "left" if below else "right")])
-        key = (element, axis, upper)
-        if key in self._known:
-            return self._known[key]
-        if key not in self._cut:
+        if (element, axis, upper) not in self._cut:
             triangles = self._triangles[element]
             above = triangles[:, :, axis] >= upper
             cut = triangles[above.any(axis=1) & ~above.all(axis=1)]
-            if len(cut) > SECTION_TRIANGLES:
-                self._known[key] = np.zeros((0, 2, 2), np.int64)
-                return self._known[key]
-            self._cut[key] = cut, bool((_normals(cut)[:, axis] == 0).all())
-        cut, prism = self._cut[key]
-        if not (prism or k == self._middle[element, axis]):
-            return np.zeros((0, 2, 2), np.int64)
-        found = section_rectangles(cut, axis, k, below=below)
-        # Between two heights of vertices a prism has one section: walls are cut by hundreds of planes.
-        if prism:
-            self._known[key] = found
-        return found
+            self._cut[element, axis, upper] = cut, bool((_normals(cut)[:, axis] == 0).all())
+        cut, prism = self._cut[element, axis, upper]
+        if len(cut) > SECTION_TRIANGLES or not (prism or k == self._middle[element, axis]):
+            return None
+        key = element, upper, 0 if prism else 1 + below
+        cuts.setdefault(key, Cut(cut, axis, k, below))
+        return key
 
     def _vertex_heights(self, element: int, axis: int) -> np.ndarray:
         """Coordinates of an element's vertices along an axis, ascending."""
@@ -248,49 +318,3 @@ def _is_box(triangles: np.ndarray) -> bool:
 def _normals(triangles: np.ndarray) -> np.ndarray:
     a, b = (triangles[:, i].astype(np.int64) - triangles[:, 0] for i in (1, 2))
     return np.cross(a, b)
-
-
-def section_rectangles(cut: np.ndarray, axis: int, k: int, *, below: bool) -> np.ndarray:
-    """Rectangles inside the section of a closed surface just below or just above a plane.
-
-    Args:
-        cut: its triangles that reach over the plane [grid steps], shape (m, 3, 3), int32.
-        axis: perpendicular to the plane.
-        k: coordinate of the plane.
-        below: which of the two sections.
-
-    Returns:
-        Shape (n, 2, 2), int64, disjoint, wholly inside the part of the plane with winding number not 0: crossings are
-        rounded to the grid, and what comes within two steps of a rounded outline is left out.
-    """
-    heights = cut[:, :, axis].astype(np.int64)
-    above = heights >= k if below else heights > k
-    # The lone corner is the one on its own side; the two edges at it are cut.
-    lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
-    rows = np.arange(len(cut))
-    flat = cut[:, :, OTHER_AXES[axis]].astype(np.int64)
-    ends, exact = [], []
-    for step in (1, 2):
-        other = (lone + step) % 3
-        h0, h1 = heights[rows, lone], heights[rows, other]
-        share = ((k - h0) / (h1 - h0))[:, None]
-        # Both triangles of an edge must round to the same point: always from its upper end.
-        p0, p1 = flat[rows, lone], flat[rows, other]
-        share = np.where((h0 > h1)[:, None], share, 1 - share)
-        top, bottom = np.where((h0 > h1)[:, None], p0, p1), np.where((h0 > h1)[:, None], p1, p0)
-        ends.append(np.round(top + share * (bottom - top)).astype(np.int64))
-        exact.append((top == bottom) | (share == 0) | (share == 1))
-    forward = above[rows, lone]
-    edges = np.stack(
-        [np.where(forward[:, None], ends[0], ends[1]), np.where(forward[:, None], ends[1], ends[0])], axis=1
-    )
-    # An axial edge may be rounded along itself, but not across.
-    both = exact[0] & exact[1]
-    straight = (edges[:, 0] == edges[:, 1]) & both
-    rounded = ~(straight.any(axis=1) | both.all(axis=1))
-    kept = (edges[:, 0] != edges[:, 1]).any(axis=1)
-    if not kept.any():
-        return np.zeros((0, 2, 2), np.int64)
-    steps = LEVEL_STEPS if axis == 2 else SECTION_STEPS
-    rectangles, _, _ = edge_rectangles(edges[kept], steps, rounded=rounded[kept], anywhere=True)
-    return rectangles.astype(np.int64)

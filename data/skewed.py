@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from .opaque import OpaquePlanes
-from .regions import section_rectangles
+from .sections import over, section_rectangles
 
 # Faces that lean no more than this off an axial plane [degrees].
 MOST_DEG = 5.0
@@ -81,9 +81,7 @@ def _between_faces(triangles: np.ndarray, axis: int, least: float) -> list[int]:
 
 def _section(triangles: np.ndarray, axis: int, plane: int, least: float) -> np.ndarray:
     """Flat boxes inside the section of an element, shape (n, 2, 3), int32; none if it is small."""
-    above = triangles[:, :, axis] >= plane
-    cut = triangles[above.any(axis=1) & ~above.all(axis=1)]
-    rectangles = section_rectangles(cut, axis, plane, below=True)
+    _, rectangles = section_rectangles([over(triangles, axis, plane)])
     area = (rectangles[:, 1] - rectangles[:, 0]).prod(axis=1).sum()
     boxes = np.full((len(rectangles), 2, 3), plane, np.int32)
     others = [other for other in range(3) if other != axis]

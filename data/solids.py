@@ -52,13 +52,31 @@ def winding_numbers(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     out = np.zeros(len(points))
     for begin in range(0, len(points), max(1, 2_000_000 // max(1, len(triangles)))):
         stop = begin + max(1, 2_000_000 // max(1, len(triangles)))
-        d = triangles[None].astype(float) - points[begin:stop, None, None]
-        a, b, c = d[:, :, 0], d[:, :, 1], d[:, :, 2]
-        la, lb, lc = (np.sqrt((x * x).sum(axis=2)) for x in (a, b, c))
-        top = (a * np.cross(b, c)).sum(axis=2)
-        bottom = la * lb * lc + (a * b).sum(axis=2) * lc + (b * c).sum(axis=2) * la + (c * a).sum(axis=2) * lb
-        out[begin:stop] = np.arctan2(top, bottom).sum(axis=1) / (2 * np.pi)
+        out[begin:stop] = _half_angles(triangles[None] - points[begin:stop, None, None]).sum(axis=1) / (2 * np.pi)
     return out
+
+
+def winds_around(points: np.ndarray, row: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Whether the winding number of a closed surface about each point is not 0; each point has a surface of its own.
+
+    Args:
+        points: [grid steps], shape (n, 3), float64, on none of the surfaces.
+        row: point of each triangle, shape (m,).
+        triangles: [grid steps], shape (m, 3, 3).
+    """
+    angles = _half_angles(triangles - points[row, None])
+    return np.abs(np.bincount(row, angles, minlength=len(points))) > np.pi
+
+
+def _half_angles(corners: np.ndarray) -> np.ndarray:
+    """Half of the solid angles of triangles about the origin, shape (..., 3, 3), signed."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = np.moveaxis(corners.astype(float), (-2, -1), (0, 1))
+    la, lb, lc = (np.sqrt(x * x + y * y + z * z) for x, y, z in ((ax, ay, az), (bx, by, bz), (cx, cy, cz)))
+    top = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    bottom = la * lb * lc + (ax * bx + ay * by + az * bz) * lc
+    bottom += (bx * cx + by * cy + bz * cz) * la + (cx * ax + cy * ay + cz * az) * lb
+    # In the plane of a triangle the sign of a zero would say on which side the point is: on it, it is on neither.
+    return np.where(top == 0.0, 0.0, np.arctan2(top, bottom))
 
 
 def triangles_meet_boxes(triangles: np.ndarray, boxes: np.ndarray) -> np.ndarray:

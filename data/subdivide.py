@@ -23,46 +23,71 @@ def subdivide(opaque: OpaquePlanes, low: np.ndarray, high: np.ndarray, threshold
     Returns:
         Disjoint boxes that tile the given one, shape (n, 2, 3), int32.
     """
-    leaves = []
-    todo = [(np.stack([low, high]).astype(np.int64), [boxes.astype(np.int64) for boxes in opaque.boxes])]
-    while todo:
-        box, inside = todo.pop()
-        clipped, best = [], (0.0, -1, 0)
+    boxes = np.stack([low, high])[None].astype(np.int64)
+    inside = [(np.zeros(len(part), np.int64), part.astype(np.int64)) for part in opaque.boxes]
+    # All nodes of a depth at once, in the order of a walk that goes down the lower side first.
+    while True:
+        share, axis_of, plane_of = np.zeros(len(boxes)), np.full(len(boxes), -1), np.zeros(len(boxes), np.int64)
         for axis in range(3):
-            rectangles = _clip(inside[axis], box, axis, opaque.sliver)
-            clipped.append(rectangles)
-            if len(rectangles):
-                share, plane = _best_plane(rectangles, box, axis, threshold)
-                best = max(best, (share, axis, plane))
-        if best[1] < 0:
-            leaves.append(box)
-            continue
-        _, axis, plane = best
-        lower, upper = box.copy(), box.copy()
-        lower[1, axis] = upper[0, axis] = plane
-        todo += [(upper, clipped), (lower, clipped)]
-    return np.array(leaves, np.int32)
+            inside[axis] = _clip(*inside[axis], boxes, axis, opaque.sliver)
+            node, found, plane = _best_planes(*inside[axis], boxes, axis, threshold)
+            better = (found > 0.0) & (found >= share[node])
+            node = node[better]
+            share[node], axis_of[node], plane_of[node] = found[better], axis, plane[better]
+        cut = np.flatnonzero(axis_of >= 0)
+        if not len(cut):
+            return boxes.astype(np.int32)
+        times = np.ones(len(boxes), np.int64)
+        times[cut] = 2
+        lower = np.cumsum(times) - times
+        boxes = np.repeat(boxes, times, axis=0)
+        boxes[lower[cut], 1, axis_of[cut]] = boxes[lower[cut] + 1, 0, axis_of[cut]] = plane_of[cut]
+        for axis, (node, rectangles) in enumerate(inside):
+            mine = np.flatnonzero(axis_of[node] >= 0)
+            node = (lower[node[mine], None] + np.array([0, 1])).ravel()
+            order = np.argsort(node, kind="stable")
+            inside[axis] = node[order], np.repeat(rectangles[mine], 2, axis=0)[order]
 
 
-def _clip(rectangles: np.ndarray, box: np.ndarray, axis: int, sliver: int = 0) -> np.ndarray:
-    """Parts of flat boxes that lie strictly inside a box on their axis and reach further into it than a sliver."""
+def _clip(
+    node: np.ndarray, rectangles: np.ndarray, boxes: np.ndarray, axis: int, sliver: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Parts of flat boxes that lie strictly inside their node on their axis and reach further into it than a sliver."""
     k = rectangles[:, 0, axis]
-    rectangles = rectangles[(k > box[0, axis]) & (k < box[1, axis])]
-    low, high = np.maximum(rectangles[:, 0], box[0]), np.minimum(rectangles[:, 1], box[1])
-    keep = (high - low)[:, OTHER_AXES[axis]].min(axis=1) > sliver if len(rectangles) else np.zeros(0, bool)
-    return np.stack([low[keep], high[keep]], axis=1)
-
-
-def _best_plane(rectangles: np.ndarray, box: np.ndarray, axis: int, threshold: float) -> tuple[float, int]:
-    """Largest opaque share of the cross-section and its plane; share 0 if none passes the threshold."""
+    rows = np.flatnonzero((k > boxes[node, 0, axis]) & (k < boxes[node, 1, axis]))
+    node, rectangles = node[rows], rectangles[rows]
+    low, high = np.maximum(rectangles[:, 0], boxes[node, 0]), np.minimum(rectangles[:, 1], boxes[node, 1])
     u, v = OTHER_AXES[axis]
-    sides = (rectangles[:, 1] - rectangles[:, 0]).astype(float)
-    planes, where = np.unique(rectangles[:, 0, axis], return_inverse=True)
-    area = np.bincount(where, sides[:, u] * sides[:, v])
+    keep = np.minimum(high[:, u] - low[:, u], high[:, v] - low[:, v]) > sliver
+    return node[keep], np.stack([low[keep], high[keep]], axis=1)
+
+
+def _best_planes(
+    node: np.ndarray, rectangles: np.ndarray, boxes: np.ndarray, axis: int, threshold: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes that hold rectangles; largest opaque share of the cross-section of each, 0 below the threshold; its plane.
+
+    Args:
+        node: of each rectangle, ascending.
+        rectangles: flat boxes inside their nodes, those of a node by plane.
+        boxes: of all nodes.
+        axis: perpendicular to the planes.
+        threshold: as of `subdivide`.
+    """
+    if not len(node):
+        return node, np.zeros(0), node
+    u, v = OTHER_AXES[axis]
+    sides, k = (rectangles[:, 1] - rectangles[:, 0]).astype(float), rectangles[:, 0, axis]
+    heads = np.flatnonzero(np.append(True, (np.diff(node) != 0) | (np.diff(k) != 0)))
+    area = np.add.reduceat(sides[:, u] * sides[:, v], heads)
     area[area <= threshold] = 0.0
-    pick = int(area.argmax())
-    size = (box[1] - box[0]).astype(float)
-    return float(area[pick] / (size[u] * size[v])), int(planes[pick])
+    of, k = node[heads], k[heads]
+    starts = np.flatnonzero(np.append(True, np.diff(of) != 0))
+    most = np.maximum.reduceat(area, starts)
+    best = np.flatnonzero(area == np.repeat(most, np.diff(np.append(starts, len(of)))))
+    best = best[np.flatnonzero(np.diff(of[best], prepend=-1))]
+    size = (boxes[of[best], 1] - boxes[of[best], 0]).astype(float)
+    return of[best], area[best] / (size[:, u] * size[:, v]), k[best]
 
 
 def cut_rooms(cells: np.ndarray, rooms: np.ndarray) -> np.ndarray:

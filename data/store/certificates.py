@@ -55,9 +55,9 @@ import pyarrow as pa
 from ..blockers import Blockers
 from ..curtains import RISING
 from ..graph import OTHER_AXES
-from ..opaque import decompose
 from ..patches import Patches
 from ..ragged import starts_of
+from ..rasters import decompose
 from ..regions import Regions
 from .graph_folder import plan_column
 

@@ -17,8 +17,9 @@ from ...data.blockers import Blockers, join_blockers
 from ...data.occludees import Occludees
 from ...data.own_frames import find_own_frames
 from ...data.plans import NO_PLANS, Plans
-from ...data.prepared import no_patches, no_regions
+from ...data.prepared import no_patches
 from ...data.ragged import places_of
+from ...data.regions import no_regions
 from ...data.rows import Rows
 from ...data.store.certificates import Proofs
 from ...data.verdict import Verdict

@@ -6,7 +6,8 @@ from builders import random_solids, small_house
 from viewcell.data import prepared
 from viewcell.data.buildings.arcade import ARCH_M, BAY_M, SPRING_M, make_arcade
 from viewcell.data.buildings.shell import OUTER_WALL_M
-from viewcell.data.prepared import PreparedModel, no_patches, no_regions
+from viewcell.data.prepared import PreparedModel, no_patches
+from viewcell.data.regions import no_regions
 from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
 from viewcell.verify.proofs.opaque import bounds_disc
 

@@ -6,7 +6,6 @@ import trimesh
 from builders import random_solids
 from viewcell.data.graph import OTHER_AXES
 from viewcell.data.prepared import PreparedModel
-from viewcell.data.regions import section_rectangles
 from viewcell.data.solids import winding_numbers
 
 
@@ -122,22 +121,3 @@ def test_rectangles_lie_in_their_region_and_cover_it():
         assert inside.any(axis=1).all()
         area = np.prod(cells[:, 1] - cells[:, 0], axis=1)
         np.testing.assert_allclose((inside * area[:, None]).sum(axis=0), np.prod(boxes[:, 1] - boxes[:, 0], axis=1))
-
-
-def extruded(plan, low, high):
-    """Triangles of a convex prism over a plan [grid steps], its faces outwards, shape (m, 3, 3), int32."""
-    count, plan = len(plan), np.array(plan)
-    bottom, top = (np.column_stack([plan, np.full(count, z)]) for z in (low, high))
-    faces = [(bottom[0], bottom[i + 1], bottom[i]) for i in range(1, count - 1)]
-    faces += [(top[0], top[i], top[i + 1]) for i in range(1, count - 1)]
-    for i in range(count):
-        j = (i + 1) % count
-        faces += [(bottom[i], bottom[j], top[j]), (bottom[i], top[j], top[i])]
-    return np.array(faces, np.int32)
-
-
-def test_a_mitred_wall_has_a_section():
-    """It lacks four steps at the mitres, where the outline is rounded; once all of it was lost."""
-    wall = extruded([(3599, -3069), (3804, -2864), (3804, 3802), (3599, 4007)], -5509, -3072)
-    over = (wall[:, :, 0] < 3701).any(axis=1) & (wall[:, :, 0] >= 3701).any(axis=1)
-    assert section_rectangles(wall[over], 0, 3701, below=True).tolist() == [[[-2963, -5509], [3901, -3072]]]

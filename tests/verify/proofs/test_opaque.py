@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from builders import random_solids
 from viewcell.data.graph import OTHER_AXES
-from viewcell.data.opaque import decompose
 from viewcell.data.prepared import PreparedModel
+from viewcell.data.rasters import decompose
 from viewcell.verify.proofs.opaque import OpaqueSurfaces, bounds_disc
 
 
