@@ -18,7 +18,7 @@ from .first_hits import FirstHits
 # Sightlines aimed at each object before anything is proved: most visible objects fall to the first few; then at each
 # that is left, round by round.
 FIRST_TRIES = 12
-AIM_ROUNDS = (32, 128, 512)
+AIM_ROUNDS = (32, 128, 1024)
 
 
 @dataclass
