@@ -119,7 +119,10 @@ def find_room_points(scene: Scene, solids: list[tuple[int, np.ndarray]]) -> list
     points = [eye_points(space) / scene.grid_m for space in scene.spaces]
     around = [np.array([own.min(axis=0), own.max(axis=0)]) if len(own) else np.zeros((2, 3)) for own in points]
     index = SolidIndex(np.array(around).reshape(-1, 2, 3), solids)
-    return [own[index.outside(own, room)] for room, own in enumerate(points)]
+    rooms = np.repeat(np.arange(len(points)), [len(own) for own in points])
+    free = index.outside(np.concatenate([np.zeros((0, 3)), *points]), rooms)
+    ends = np.cumsum([len(own) for own in points])[:-1]
+    return [own[mine] for own, mine in zip(points, np.split(free, ends) if points else [], strict=True)]
 
 
 def _with_cells(graph: CellGraph, prisms: list[tuple[np.ndarray, np.ndarray]], names: list[str]) -> CellGraph:

@@ -256,11 +256,17 @@ class Scene:
 
 
 def bounds_by_owner(triangles: np.ndarray, owners: np.ndarray, count: int) -> np.ndarray:
-    """Boxes around the triangles of each of so many owners [grid steps], (count, 2, 3), int64; min > max for none."""
+    """Boxes around the triangles of each of so many owners [grid steps], (count, 2, 3), int64; min > max for none.
+
+    Owners ascend.
+    """
     bounds = np.empty((count, 2, 3), np.int64)
     bounds[:, 0], bounds[:, 1] = GRID_LIMIT, -GRID_LIMIT
-    np.minimum.at(bounds[:, 0], owners, triangles.min(axis=1))
-    np.maximum.at(bounds[:, 1], owners, triangles.max(axis=1))
+    if len(owners):
+        heads = np.flatnonzero(np.diff(owners, prepend=-1))
+        one, two, three = triangles.transpose(1, 0, 2)
+        bounds[owners[heads], 0] = np.minimum.reduceat(np.minimum(np.minimum(one, two), three), heads)
+        bounds[owners[heads], 1] = np.maximum.reduceat(np.maximum(np.maximum(one, two), three), heads)
     return bounds
 
 

@@ -3,11 +3,16 @@
 Only closed elements count, each alone: an open ceiling would make everything under it "inside".
 """
 
+from itertools import pairwise
+
 import numpy as np
 
+from .ragged import places_of, starts_of
 from .scene import GRID_LIMIT, OPAQUE, Role, Scene
 
 SHIFT = 2 * GRID_LIMIT
+# Pairs of a point and a triangle that are looked at together.
+PAIRS = 200_000
 
 
 def closed_elements(scene: Scene, *roles: Role) -> list[tuple[int, np.ndarray]]:
@@ -64,8 +69,12 @@ def winds_around(points: np.ndarray, row: np.ndarray, triangles: np.ndarray) -> 
         row: point of each triangle, shape (m,).
         triangles: [grid steps], shape (m, 3, 3).
     """
-    angles = _half_angles(triangles - points[row, None])
-    return np.abs(np.bincount(row, angles, minlength=len(points))) > np.pi
+    return np.abs(_windings(points, row, triangles)) > 0.5
+
+
+def _windings(points: np.ndarray, row: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """As `winding_numbers`, of a surface for each point; arguments as of `winds_around`."""
+    return np.bincount(row, _half_angles(triangles - points[row, None]), minlength=len(points)) / (2 * np.pi)
 
 
 def _half_angles(corners: np.ndarray) -> np.ndarray:
@@ -149,26 +158,44 @@ class SolidIndex:
             cells: [grid steps], shape (n, 2, 3), int32.
             solids: as from `closed_elements`.
         """
-        self._solids = [triangles for _, triangles in solids]
-        self._boxes = np.array([[t.min(axis=(0, 1)), t.max(axis=(0, 1))] for t in self._solids]).reshape(-1, 2, 3)
+        self._starts = starts_of([len(triangles) for _, triangles in solids])
+        self._triangles = np.concatenate([np.zeros((0, 3, 3), np.int32), *(triangles for _, triangles in solids)])
+        self._boxes = np.array([[t.min(axis=(0, 1)), t.max(axis=(0, 1))] for _, t in solids]).reshape(-1, 2, 3)
         self._cells = cells
+        self._near: dict[int, np.ndarray] = {}
 
-    def outside(self, points: np.ndarray, cell: int) -> np.ndarray:
-        """Points of one cell that certainly lie outside every solid.
+    def outside(self, points: np.ndarray, cell: int | np.ndarray) -> np.ndarray:
+        """Points that certainly lie outside every solid.
 
         Args:
-            points: [grid steps], shape (n, 3), float64, inside the open cell.
-            cell: the cell that holds them.
+            points: [grid steps], shape (n, 3), float64, each inside its open cell.
+            cell: the cell that holds them all, or that of each, shape (n,).
 
         Returns:
             Shape (n,), bool. True is safe; False may lie on a surface or in a doubtful place.
         """
-        low, high = self._cells[cell]
-        near = np.flatnonzero((self._boxes[:, 0] < high).all(axis=1) & (self._boxes[:, 1] > low).all(axis=1))
-        free = np.ones(len(points), bool)
-        for solid in near:
-            boxed = free & (points >= self._boxes[solid, 0]).all(axis=1) & (points <= self._boxes[solid, 1]).all(axis=1)
-            held = np.flatnonzero(boxed)
-            if len(held):
-                free[held] = np.abs(winding_numbers(points[held], self._solids[solid])) < 1e-3
+        rows, solids = self._boxed(points, np.broadcast_to(cell, len(points)))
+        sizes = np.diff(self._starts)[solids]
+        free, total = np.ones(len(points), bool), np.cumsum(sizes)
+        for first, stop in pairwise([0, *(np.flatnonzero(np.diff(total // PAIRS)) + 1).tolist(), len(rows)]):
+            row = np.repeat(np.arange(stop - first), sizes[first:stop])
+            triangles = self._triangles[places_of(self._starts[solids[first:stop]], sizes[first:stop])]
+            within = np.abs(_windings(points[rows[first:stop]], row, triangles)) >= 1e-3
+            free[rows[first:stop][within]] = False
         return free
+
+    def _boxed(self, points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points, and solids that reach into their cells, whose boxes hold them."""
+        rows, solids = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+        for cell in np.unique(cells).tolist():
+            if cell not in self._near:
+                low, high = self._cells[cell]
+                meet = (self._boxes[:, 0] < high).all(axis=1) & (self._boxes[:, 1] > low).all(axis=1)
+                self._near[cell] = np.flatnonzero(meet)
+            near, mine = self._near[cell], np.flatnonzero(cells == cell)
+            low, high = self._boxes[near].transpose(1, 0, 2)
+            own = points[mine, None]
+            row, solid = np.nonzero(((own >= low) & (own <= high)).all(axis=2))
+            rows.append(mine[row])
+            solids.append(near[solid])
+        return np.concatenate(rows), np.concatenate(solids)

@@ -67,10 +67,7 @@ class Sights:
 
     def outside(self, source: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Points in their cells' boxes that are eyes: within the plan, certainly outside every solid, (n,), bool."""
-        free = np.zeros(len(source), bool)
-        for cell in np.unique(source):
-            rows = np.flatnonzero(source == cell)
-            free[rows] = self.solids.outside(points[rows], int(cell))
+        free = self.solids.outside(points, source)
         return free & self.plans.hold(source, points, len(self.cells))
 
     def clear(self, source: np.ndarray, origin: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -367,4 +367,5 @@ def _finish(figure: Figure, handles: list, path: Path) -> None:
         frameon=False,
         fontsize=9,
     )
-    figure.savefig(path, dpi=110, bbox_inches="tight")
+    # The layout leaves no room around; to look for it draws everything twice.
+    figure.savefig(path, dpi=110)
