@@ -13,6 +13,7 @@ A set has one code: a number in more bytes than it needs is refused. Short where
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -85,7 +86,7 @@ def encode(starts: np.ndarray, ids: np.ndarray) -> list[bytes]:
     code, sizes = _numbers_as_bytes(np.column_stack([gap, runs.length - 1]).ravel())
     ends = starts_of(sizes)[2 * runs.starts]
     whole = code.tobytes()
-    return [whole[a:b] for a, b in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)]
+    return [whole[a:b] for a, b in pairwise(ends.tolist())]
 
 
 def decode(codes: Sequence[bytes], count: int) -> RunSets:
