@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .animation import Animation
 from .errors import InputError
 from .ragged import starts_of
 
@@ -86,6 +87,12 @@ class Instance:
         why: what it was taken for glass or a door by, in words; empty for the rest, and not kept in folders.
         storey: that the file puts it on; None where it says none.
         materials: names of what the file says it is made of, each once, in the file's order.
+        colour: red, green, blue and opacity, 0 to 255, of its faces that have no colour of their own; None where none
+            is known.
+        animation: how it moves; None if it does not. What moves hides nothing: its role is TRANSPARENT.
+
+    Raises:
+        InputError: it moves and has another role.
     """
 
     name: str
@@ -97,6 +104,13 @@ class Instance:
     why: str = ""
     storey: NamedStorey | None = None
     materials: tuple[str, ...] = ()
+    colour: tuple[int, int, int, int] | None = None
+    animation: Animation | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse occluders that move."""
+        if self.animation is not None and self.role is not Role.TRANSPARENT:
+            raise InputError(f"object {self.name!r}: expected role transparent of what moves, found {self.role.value}")
 
     @property
     def opaque(self) -> bool:

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pyarrow as pa
 
+from ..animation import Animation
 from ..errors import InputError
 from ..ragged import starts_of
 from ..scene import Definition, Instance, Mesh, NamedStorey, Role, Scene, Space
@@ -64,7 +65,21 @@ def objects_table(scene: Scene) -> pa.Table:
     columns |= box_columns(boxes * scene.grid_m, empty=boxes[:, 0, 0] > boxes[:, 1, 0])
     columns |= storey_columns([placed.storey for placed in scene.objects])
     columns["materials"] = pa.array([placed.materials for placed in scene.objects], pa.list_(pa.string()))
-    return pa.table(columns)
+    # Most models have none of these; their folders stay as they were before there were such.
+    more = look_columns(scene.objects)
+    return pa.table(columns | {name: column for name, column in more.items() if column.null_count < len(column)})
+
+
+def look_columns(objects: list[Instance]) -> dict[str, pa.Array]:
+    """Colours (0xRRGGBBAA), motions and their periods [s] of objects, null where there are none or no end."""
+    moving = [placed.animation for placed in objects]
+    periods = [None if one is None or one.period_s == np.inf else one.period_s for one in moving]
+    colours = [None if placed.colour is None else int.from_bytes(placed.colour, "big") for placed in objects]
+    return {
+        "colour": pa.array(colours, pa.uint32()),
+        "animation": pa.array([None if one is None else one.text for one in moving], pa.string()),
+        "period_s": pa.array(periods, pa.float64()),
+    }
 
 
 def storey_columns(storeys: list[NamedStorey | None]) -> dict[str, pa.Array]:
@@ -208,12 +223,12 @@ def colours_of(meshes: pa.Table, faces: list[np.ndarray]) -> list[np.ndarray | N
 def _objects(objects: pa.Table) -> list[Instance]:
     columns = ("object_id", "name", "kind", "definition_id", "role")
     # Older folders have no GUIDs, storeys and materials.
-    words = optional(objects, "guid"), _storeys(objects), optional(objects, "materials")
+    words = optional(objects, "guid"), _storeys(objects), optional(objects, "materials"), _looks(objects)
     rows = zip(
         *(objects[name].to_pylist() for name in columns), list_rows(objects["transform"], 4), *words, strict=True
     )
     found = []
-    for row, (object_id, name, kind, definition_id, role, transform, guid, storey, materials) in enumerate(rows):
+    for row, (object_id, name, kind, definition_id, role, transform, guid, storey, materials, look) in enumerate(rows):
         where = f"objects.parquet: row {row}"
         if object_id != row:
             raise InputError(f"{where}: expected object_id {row}, found {object_id}")
@@ -221,7 +236,7 @@ def _objects(objects: pa.Table) -> list[Instance]:
             raise InputError(f"{where}: expected role occluder, detail or transparent, found {role!r}")
         if transform.shape != (4, 4) or not np.isfinite(transform).all():
             raise InputError(f"{where}: expected a transform of 16 finite numbers, found {transform.size}")
-        more = {"storey": storey, "materials": tuple(materials or ())}
+        more = {"storey": storey, "materials": tuple(materials or ()), **look}
         found.append(Instance(name, kind, definition_id, transform.astype(np.float64), Role(role), guid or "", **more))
     return found
 
@@ -229,6 +244,17 @@ def _objects(objects: pa.Table) -> list[Instance]:
 def optional(table: pa.Table, name: str) -> list:
     """Values of a column that older folders lack: then all None."""
     return table[name].to_pylist() if name in table.column_names else [None] * table.num_rows
+
+
+def _looks(table: pa.Table) -> list[dict]:
+    """Colour and motion of each object, as `Instance` takes them."""
+    columns = (optional(table, name) for name in ("colour", "animation", "period_s"))
+    found = []
+    for colour, text, period in zip(*columns, strict=True):
+        shown = None if colour is None else tuple(colour.to_bytes(4, "big"))
+        moving = None if text is None else Animation(text, np.inf if period is None else period)
+        found.append({"colour": shown, "animation": moving})
+    return found
 
 
 def _storeys(table: pa.Table) -> list[NamedStorey | None]:

@@ -29,8 +29,9 @@ __all__ = ["WalkFolder", "read_walk"]
 
 FORMAT, KIND = 1, "walk"
 GEOMETRY = "geometry.bin"
+LOOKS = ("colour", "animation", "period_s")
 COLUMNS = {
-    "objects": ("object_id", "name", "kind", "role", "definition_id", "transform", *BOX_COLUMNS, "items"),
+    "objects": ("object_id", "name", "kind", "role", "definition_id", "transform", *BOX_COLUMNS, *LOOKS, "items"),
     "items": ("owner", "lod", "offset", "size", "vertices", "faces", "error_m", "colour_starts", "colours"),
     "sets": ("cell_id", "potential", "unknown", "cells", "bytes"),
     "cell_items": ("cell_id", "limits"),

@@ -17,10 +17,11 @@ import pyarrow as pa
 from ..lod import object_errors
 from ..ragged import owners_of, places_of, starts_of
 from ..runs import encode
-from ..scene import Mesh, Scene
+from ..scene import Instance, Mesh, Scene
+from ..sweep import still
 from ..verdict import Verdict
 from .bake_folder import BakeFolder
-from .scene_tables import box_columns, colour_columns, list_column
+from .scene_tables import box_columns, colour_columns, list_column, look_columns
 
 # Items begin at multiples of so many bytes.
 ALIGNED = 16
@@ -76,8 +77,8 @@ def gather_items(scene: Scene, order: np.ndarray, flatten: bool) -> Items:
     Args:
         scene: the model.
         order: object_ids, each once.
-        flatten: whether every object has copies of its own, in the scene's frame; else meshes of the same content are
-            one item, and stay in their definition's frame.
+        flatten: whether every object has copies of its own, in the scene's frame, or in its definition's if it moves;
+            else meshes of the same content are one item, and stay in their definition's frame.
     """
     levels = [_own_meshes(scene, o) if flatten else shape_of(scene, o) for o in range(len(scene.objects))]
     starts = starts_of([len(meshes) for meshes in levels])
@@ -116,6 +117,8 @@ def content_of(mesh: Mesh) -> bytes:
 def _own_meshes(scene: Scene, object_id: int) -> list[Mesh]:
     """Levels of an object in the scene's frame: snapped, as the finest one is in every verdict, and turned outwards."""
     placed = scene.objects[object_id]
+    if placed.animation is not None:
+        return [*shape_of(scene, object_id)]
     errors, starts = object_errors(Scene(scene.definitions, [placed], grid_m=scene.grid_m))
     mirrored = np.linalg.det(placed.transform[:3, :3]) < 0
     out = []
@@ -129,10 +132,13 @@ def _own_meshes(scene: Scene, object_id: int) -> list[Mesh]:
 
 
 def objects_table(scene: Scene, order: np.ndarray, items: Items, flatten: bool) -> pa.Table:
-    """`objects.parquet`: a row for each object in the order, whose row number is its display id."""
-    boxes = scene.object_bounds()[order]
+    """`objects.parquet`: a row for each object in the order, whose row number is its display id.
+
+    The box of what moves holds it at all times.
+    """
+    boxes = still(scene).object_bounds()[order]
     placed = [scene.objects[i] for i in order.tolist()]
-    transforms = [np.eye(4) if flatten else one.transform for one in placed]
+    transforms = [_left_over(one, flatten) for one in placed]
     counts = np.diff(items.starts)[order]
     ids = items.of_objects[places_of(items.starts[order], counts)]
     return pa.table(
@@ -144,9 +150,15 @@ def objects_table(scene: Scene, order: np.ndarray, items: Items, flatten: bool) 
             "definition_id": pa.array([one.definition_id for one in placed], pa.int32()),
             "transform": list_column(transforms, np.float64),
             **box_columns(boxes * scene.grid_m, empty=boxes[:, 0, 0] > boxes[:, 1, 0]),
+            **look_columns(placed),
             "items": pa.ListArray.from_arrays(pa.array(starts_of(counts), pa.int32()), pa.array(ids, pa.int32())),
         }
     )
+
+
+def _left_over(placed: Instance, flatten: bool) -> np.ndarray:
+    """The transform that an object's items have yet to undergo."""
+    return np.eye(4) if flatten and placed.animation is None else placed.transform
 
 
 def items_table(items: Items) -> pa.Table:

@@ -114,13 +114,17 @@ def _shape(row: dict, items: list[dict], data: bytes, bake: BakeFolder, flattene
     number, scene, found = row["object_id"], bake.scene, []
     placed = scene.objects[number]
     meshes = scene.definitions[placed.definition_id].lods
+    if row["colour"] != (None if placed.colour is None else int.from_bytes(placed.colour, "big")):
+        found.append(f"object {number}: another colour")
+    if row["animation"] != (None if placed.animation is None else placed.animation.text):
+        found.append(f"object {number}: another motion")
     if len(meshes) != len(row["items"]):
         return [f"object {number}: another number of levels"]
     transform = np.array(row["transform"]).reshape(4, 4)
     for lod, (item, mesh) in enumerate(zip(row["items"], meshes, strict=True)):
         here = item_triangles(data, items[item], transform, scene.grid_m)
         there = world_triangles(mesh.vertices, mesh.faces, placed.transform, scene.grid_m)
-        if flattened and np.linalg.det(placed.transform[:3, :3]) < 0:
+        if flattened and placed.animation is None and np.linalg.det(placed.transform[:3, :3]) < 0:
             there = turned(there)
         if here != there or items[item]["offset"] % 16:
             found.append(f"object {number}: other triangles at level {lod}")
@@ -128,7 +132,7 @@ def _shape(row: dict, items: list[dict], data: bytes, bake: BakeFolder, flattene
             found.append(f"object {number}: other colours at level {lod}")
         if items[item]["error_m"] < mesh.error_m * (0.0 if flattened else 1.0):
             found.append(f"object {number}: a smaller error at level {lod}")
-        if lod == 0:
+        if lod == 0 and row["animation"] is None:
             corners = np.array([t for t in here if len(_plane(t))]).reshape(-1, 3)
             found += _box(row, corners * scene.grid_m)
     return found
