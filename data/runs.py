@@ -141,12 +141,13 @@ def _bytes_as_numbers(code: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray,
     Raises:
         InputError: a number that goes on beyond the end of its set, or is longer than any, or than it need be.
     """
-    last = np.flatnonzero(code < 0x80)
-    at = np.searchsorted(last, starts)
-    ended = np.append(-1, last)[at] == starts - 1
+    # Ends of numbers, behind one before the first byte.
+    last = np.append(-1, np.flatnonzero(code < 0x80))
+    at = np.searchsorted(last[1:], starts)
+    ended = last[at] == starts - 1
     if not ended.all():
         raise InputError(f"runs: expected numbers that end with their set, found set {_first_of(~ended)} cut short")
-    sizes = np.diff(last, prepend=-1)
+    sizes, last = np.diff(last), last[1:]
     if len(sizes) and (sizes.max() > MOST_BYTES or (code[last[sizes > 1]] == 0).any()):
         raise InputError(f"runs: expected numbers in the fewest bytes, {MOST_BYTES} at most, found others")
     numbers = (code[last] & 0x7F).astype(np.int64)
