@@ -27,6 +27,8 @@ import numpy as np
 from .errors import InputError
 from .interval import Interval, cosine, sine
 
+__all__ = ["Animation"]
+
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 STEP = re.compile(rf"\s*-([trs][xyz]|sa)\s+(?:\$([^$]*)\$|({NUMBER}))(?=\s|$)")
 # Longer texts are no motion that a person wrote.
