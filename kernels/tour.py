@@ -46,7 +46,7 @@ class Columns:
 class Tour:
     """Cities in order, the place of each, those that wait (a ring), and who is in it.
 
-    `state` has the queue's first place, how many wait, and the city that was last seen to be left over.
+    `state` has the queue's first place, how many wait, and how far along `jumps` all are in the tour.
     """
 
     order: wp.array[int]
@@ -216,23 +216,23 @@ def two_opt(columns: Columns, tour: Tour, a: int, way: int) -> bool:
     """Exchange the edge from a on, and one of a near city, if that shortens the tour. Whether it did."""
     b = beside(tour, a, way)
     removed = distance(columns.words, a, b)
-    done = bool(False)
     for k in range(columns.near.shape[1]):
         c = columns.near[a, k]
-        if not done and c >= 0:
-            added = distance(columns.words, a, c)
-            # Lists begin with the nearest: what follows gains nothing either.
-            if added < removed:
-                d = beside(tour, c, way)
-                gain = removed + distance(columns.words, c, d) - added - distance(columns.words, b, d)
-                if gain > 0:
-                    exchange(tour, a, b, c, d)
-                    wait(tour, a)
-                    wait(tour, b)
-                    wait(tour, c)
-                    wait(tour, d)
-                    done = bool(True)
-    return done
+        if c < 0:
+            break
+        added = distance(columns.words, a, c)
+        # Lists begin with the nearest: what follows gains nothing either.
+        if added >= removed:
+            break
+        d = beside(tour, c, way)
+        if removed + distance(columns.words, c, d) > added + distance(columns.words, b, d):
+            exchange(tour, a, b, c, d)
+            wait(tour, a)
+            wait(tour, b)
+            wait(tour, c)
+            wait(tour, d)
+            return True
+    return False
 
 
 @wp.func
@@ -244,39 +244,40 @@ def or_opt(columns: Columns, tour: Tour, a: int, way: int, length: int) -> bool:
     n = beside(tour, end, way)
     removed = distance(columns.words, p, a)
     freed = removed + distance(columns.words, end, n) - distance(columns.words, p, n)
-    done = bool(False)
     for k in range(2 * columns.near.shape[1]):
         c = columns.near[a, k / 2]
-        if not done and c >= 0:
-            added = distance(columns.words, a, c)
-            # How far along c lies: it must be beyond the cities that move.
-            ahead = (tour.place[c] - tour.place[a]) * way
-            if ahead < 0:
-                ahead += count
-            turn = way * (1 - 2 * (k % 2))
-            e = beside(tour, c, turn)
-            # Nor may the place be the gap that they leave.
-            gap = (c == n and e == end) or (c == p and e == a)
-            if added < removed and ahead >= length and not gap:
-                gain = freed + distance(columns.words, c, e) - added - distance(columns.words, end, e)
-                if gain > 0:
-                    if turn == way:
-                        # p [a .. end] n .. c e: to p n .. c [a .. end] e
-                        exchange(tour, p, a, c, e)
-                        exchange(tour, p, c, n, end)
-                        exchange(tour, c, end, a, e)
-                    else:
-                        # p [a .. end] n .. e c: to p n .. e [end .. a] c
-                        exchange(tour, p, a, e, c)
-                        exchange(tour, p, e, n, end)
-                    wait(tour, p)
-                    wait(tour, a)
-                    wait(tour, end)
-                    wait(tour, n)
-                    wait(tour, c)
-                    wait(tour, e)
-                    done = bool(True)
-    return done
+        if c < 0:
+            break
+        added = distance(columns.words, a, c)
+        if added >= removed:
+            break
+        # How far along c lies: it must be beyond the cities that move.
+        ahead = (tour.place[c] - tour.place[a]) * way
+        if ahead < 0:
+            ahead += count
+        turn = way * (1 - 2 * (k % 2))
+        e = beside(tour, c, turn)
+        # Nor may the place be the gap that they leave.
+        gap = (c == n and e == end) or (c == p and e == a)
+        gain = freed + distance(columns.words, c, e) - added - distance(columns.words, end, e)
+        if gain > 0 and ahead >= length and not gap:
+            if turn == way:
+                # p [a .. end] n .. c e: to p n .. c [a .. end] e
+                exchange(tour, p, a, c, e)
+                exchange(tour, p, c, n, end)
+                exchange(tour, c, end, a, e)
+            else:
+                # p [a .. end] n .. e c: to p n .. e [end .. a] c
+                exchange(tour, p, a, e, c)
+                exchange(tour, p, e, n, end)
+            wait(tour, p)
+            wait(tour, a)
+            wait(tour, end)
+            wait(tour, n)
+            wait(tour, c)
+            wait(tour, e)
+            return True
+    return False
 
 
 @wp.kernel

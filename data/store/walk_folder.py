@@ -192,6 +192,8 @@ def read_walk(folder: str | Path) -> WalkFolder:
             _check_file(folder / name, manifest["files"][name])
         walk = WalkFolder(folder, manifest)
         _check_numbers(walk)
+    except InputError:
+        raise
     except (ValueError, TypeError, KeyError, pa.ArrowException) as error:
         raise InputError(f"{folder}: expected a readable display database, found {one_line(error)}") from None
     return walk

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -75,7 +76,9 @@ def pack(
         held = held_manifest(out, KIND)
         if held is not None and not overwrite:
             if all(held.get(name) == value for name, value in facts.items()):
-                return read_walk(out)
+                # What is damaged is packed anew.
+                with suppress(InputError):
+                    return read_walk(out)
             if held.get("bake", {}).get("path") != facts["bake"]["path"]:
                 raise InputError(
                     f"{out}: expected a display database of this bake, found one of {held['bake']['path']}; "

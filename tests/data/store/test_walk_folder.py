@@ -103,6 +103,7 @@ def test_broken_folders_are_refused_in_one_line(words, folder):
     with pytest.raises(InputError) as error:
         read_walk(folder)
     assert re.search(words, str(error.value)) and "\n" not in str(error.value)
+    assert ("readable" in str(error.value)) == ("readable" in words)
 
 
 def test_every_byte_counts(packed, folder):

@@ -96,6 +96,7 @@ def test_command(made, tmp_path, capsys):
     assert "flattened" in capsys.readouterr().out and (out / "notes.txt").read_text() == "mine"
     assert default_out(made) == made.folder.with_name("house.walk")
     assert viewcell.pack(str(made.folder), out, flatten=True).manifest == read_walk(out).manifest
+    assert made.pack(out, flatten=True).manifest == read_walk(out).manifest
 
 
 def test_a_changed_bake_is_told(copy, made, capsys):
@@ -110,6 +111,14 @@ def test_a_changed_bake_is_told(copy, made, capsys):
     before = hashes(copy)
     assert main(["pack", str(table.parent), "-o", str(copy)]) == 0
     assert hashes(copy) != before and read_walk(copy).stale() == ""
+
+
+def test_a_damaged_pack_is_packed_anew(copy, capsys):
+    before, geometry = hashes(copy), copy / "geometry.bin"
+    geometry.write_bytes(geometry.read_bytes()[:-5])
+    assert "cut short" in refused(capsys, "--check", copy)
+    assert main(["pack", str(copy.with_name("house.bake")), "-o", str(copy)]) == 0
+    assert "written to" in capsys.readouterr().out and hashes(copy) == before
 
 
 def test_another_bakes_pack_is_not_replaced_unasked(made, copy, capsys):
