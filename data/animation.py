@@ -19,7 +19,6 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -33,8 +32,8 @@ NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 STEP = re.compile(rf"\s*-([trs][xyz]|sa)\s+(?:\$([^$]*)\$|({NUMBER}))(?=\s|$)")
 # Longer texts are no motion that a person wrote.
 LONGEST = 2000
-# Parts of a period.
-PARTS = 256
+# Parts of a period, and vertices that are moved at a time.
+PARTS, CHUNK = 256, 2048
 
 Value = TypeVar("Value", float, Interval)
 
@@ -132,16 +131,18 @@ class Animation:
         Raises:
             InputError: it does not stay within bounds, or a term may divide by zero.
         """
-        ends = np.linspace(0.0, self.period_s, PARTS + 1).tolist() if np.isfinite(self.period_s) else [0.0, np.inf]
+        ends = np.linspace(0.0, self.period_s, PARTS + 1) if np.isfinite(self.period_s) else np.array([0.0, np.inf])
+        # Parts of the period down, vertices across.
+        times = Interval(ends[:-1, None], ends[1:, None])
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
-        still = [Interval(column, column) for column in np.asarray(vertices, np.float64).T]
-        times = [Interval(np.float64(begin), np.float64(end)) for begin, end in pairwise(ends)]
-        for points in (still, *(self._moved(still, time) for time in times)):
-            for axis in range(3):
-                row = [Interval.of(value) for value in transform[axis]]
-                there = points[0] * row[0] + points[1] * row[1] + points[2] * row[2] + row[3]
-                low[axis] = np.minimum(low[axis], np.min(there.low))
-                high[axis] = np.maximum(high[axis], np.max(there.high))
+        for begin in range(0, len(vertices), CHUNK):
+            unmoved = [Interval(column, column) for column in np.float64(vertices[begin : begin + CHUNK]).T]
+            for points in (unmoved, self._moved(unmoved, times)):
+                for axis in range(3):
+                    row = [Interval.of(value) for value in transform[axis]]
+                    there = points[0] * row[0] + points[1] * row[1] + points[2] * row[2] + row[3]
+                    low[axis] = np.minimum(low[axis], np.min(there.low))
+                    high[axis] = np.maximum(high[axis], np.max(there.high))
         if not (np.isfinite(low).all() and np.isfinite(high).all()):
             raise InputError(f"{where}: expected a motion that stays within bounds, found {self.text!r}")
         return np.array([low, high])

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from ..lod import object_errors
 from ..ragged import owners_of, places_of, starts_of
@@ -203,7 +204,7 @@ def display_sets(bake: BakeFolder, cells: np.ndarray, order: np.ndarray) -> Disp
     rank[order], row_of[cells] = np.arange(count), np.arange(len(cells))
     row = row_of[table["cell_id"].to_numpy()]
     members = rank[table["object_id"].to_numpy()]
-    unknown = np.array(table["verdict"].to_pylist(), object) == Verdict.UNKNOWN.word
+    unknown = pc.equal(table["verdict"], Verdict.UNKNOWN.word).to_numpy()
     sorting = np.lexsort((members, row))
     row, members, unknown = row[sorting], members[sorting], unknown[sorting]
     limits, lods = np.zeros(len(row), np.uint8), bake.cell_lods

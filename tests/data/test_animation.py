@@ -71,6 +71,12 @@ def test_boxes_hold_what_moves_at_any_time(motion, times, seed):
     assert (unmoved >= low).all() and (unmoved <= high).all()
 
 
+def test_boxes_hold_the_object_as_it_stands_unmoved():
+    """Other commands look at models without a time."""
+    low, high = Animation("-tx 5").swept_box(FAN, np.eye(4), "a fan")
+    assert np.allclose([low[0], high[0]], [-0.6, 5.6])
+
+
 def test_boxes_are_tight():
     """A fan's is the square around its circle; a swing of five metres in four seconds reaches five metres."""
     low, high = Animation("-rz $90 * t$", 4.0).swept_box(FAN, np.eye(4), "a fan")

@@ -3,6 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from builders.four_rooms import hashes
 from builders.packed_house import packed_scene
@@ -102,9 +104,29 @@ def test_folders_keep_motion_and_colour(tmp_path):
 
 
 def read_columns(path):
-    import pyarrow.parquet as pq
-
     return pq.read_schema(path).names
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "words"),
+    [
+        ("animation", "nonsense", "animation: expected steps"),
+        ("period_s", -1.0, "a period above 0"),
+        ("role", "detail", "role transparent of what moves, found detail"),
+    ],
+)
+def test_folders_with_broken_motions_are_refused_in_one_line(column, value, words, tmp_path):
+    scene, number = moving_scene()
+    write_scene(scene, tmp_path / "a.scene")
+    path = tmp_path / "a.scene" / "objects.parquet"
+    table = pq.read_table(path)
+    values = table[column].to_pylist()
+    values[number] = value
+    at = table.column_names.index(column)
+    pq.write_table(table.set_column(at, column, pa.array(values, table.schema.field(column).type)), path)
+    with pytest.raises(InputError, match=words) as error:
+        read_scene(tmp_path / "a.scene")
+    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("role", [Role.OCCLUDER, Role.DETAIL])
