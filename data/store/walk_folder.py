@@ -21,6 +21,7 @@ from ..errors import InputError
 from ..ragged import starts_of
 from ..runs import RunSets, decode
 from ..scene import Mesh
+from .framed import FramedFolder
 from .scene_folder import new_folder, one_line, read_manifest, read_table
 from .scene_tables import BOX_COLUMNS, colours_of, list_rows
 from .walk_tables import SHORT, item_size
@@ -45,23 +46,8 @@ SOURCES = ("meshes", "objects", "cells", "portals", "cell_to_cell", "cell_to_obj
 BINARY = ("potential", "unknown", "cells", "limits")
 
 
-class WalkFolder:
-    """A display database: objects, their levels of detail, and what may be visible from where.
-
-    Attributes:
-        folder: where it is.
-        manifest: contents of manifest.json.
-        grid_m: grid step [m].
-        origin: whole metres subtracted from the model's coordinates, float64 x 3.
-        yaw_deg: the model was then turned back by this about the vertical [degrees].
-    """
-
-    def __init__(self, folder: Path, manifest: dict) -> None:
-        self.folder = folder
-        self.manifest = manifest
-        self.grid_m = float(manifest["grid_m"])
-        self.origin = np.array(manifest["origin"], np.float64)
-        self.yaw_deg = float(manifest["yaw_deg"])
+class WalkFolder(FramedFolder):
+    """A display database: objects, their levels of detail, and what may be visible from where."""
 
     def __repr__(self) -> str:
         """What it holds, on a line."""
