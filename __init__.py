@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .workbench.baked import Bake, load
     from .workbench.check.run import assert_conservative, check
     from .workbench.inspect.run import inspect
+    from .workbench.pack.run import pack
     from .workbench.report.run import report
 
 _HOME = {
@@ -34,6 +35,7 @@ _HOME = {
     "inspect": "viewcell.workbench.inspect.run",
     "load": "viewcell.workbench.baked",
     "make_office": "viewcell.data.buildings.office",
+    "pack": "viewcell.workbench.pack.run",
     "read": "viewcell.data.readers",
     "report": "viewcell.workbench.report.run",
 }
@@ -50,6 +52,7 @@ __all__ = [
     "inspect",
     "load",
     "make_office",
+    "pack",
     "read",
     "report",
 ]

@@ -4,7 +4,7 @@ Every later verdict is exact for the *snapped* model: world vertex = round(trans
 coordinate, relative to `origin`. Source of the definition/instance/LOD scheme: Funkhouser et al. 1996, section 2.2.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from itertools import product
@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .animation import Animation
 from .errors import InputError
 from .ragged import starts_of
 
@@ -86,6 +87,12 @@ class Instance:
         why: what it was taken for glass or a door by, in words; empty for the rest, and not kept in folders.
         storey: that the file puts it on; None where it says none.
         materials: names of what the file says it is made of, each once, in the file's order.
+        colour: red, green, blue and opacity, 0 to 255, of its faces that have no colour of their own; None where none
+            is known.
+        animation: how it moves; None if it does not. What moves hides nothing: its role is TRANSPARENT.
+
+    Raises:
+        InputError: it moves and has another role.
     """
 
     name: str
@@ -97,6 +104,13 @@ class Instance:
     why: str = ""
     storey: NamedStorey | None = None
     materials: tuple[str, ...] = ()
+    colour: tuple[int, int, int, int] | None = None
+    animation: Animation | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse occluders that move."""
+        if self.animation is not None and self.role is not Role.TRANSPARENT:
+            raise InputError(f"object {self.name!r}: expected role transparent of what moves, found {self.role.value}")
 
     @property
     def opaque(self) -> bool:
@@ -168,6 +182,25 @@ class Scene:
     def in_model(self, points: np.ndarray) -> np.ndarray:
         """Points of the scene's frame [m] in the model's own, shape (..., 3), float64."""
         return turned(points, self.yaw_deg) + self.origin
+
+    def with_own_geometry(self, object_id: int, lods: dict[int, Mesh]) -> "Scene":
+        """The scene in which an object has shapes of its own at some levels; the others it shares as before.
+
+        Source: Funkhouser et al. 1996, section 2.2. The object gets a definition of its own, whose other levels are the
+        very meshes of the old one; a display database stores meshes of the same content once.
+
+        Raises:
+            InputError: a level that its definition does not have.
+        """
+        placed = self.objects[object_id]
+        shape = self.definitions[placed.definition_id]
+        unknown = [lod for lod in lods if not 0 <= lod < len(shape.lods)]
+        if unknown:
+            raise InputError(f"object {object_id}: expected a level below {len(shape.lods)}, found {unknown[0]}")
+        own = Definition(shape.name, tuple(lods.get(lod, mesh) for lod, mesh in enumerate(shape.lods)))
+        objects = [*self.objects]
+        objects[object_id] = replace(placed, definition_id=len(self.definitions))
+        return replace(self, definitions=[*self.definitions, own], objects=objects)
 
     def world_vertices(self, object_id: int, lod: int = 0) -> np.ndarray:
         """Snapped world vertices of one object [grid steps], shape (n, 3), int32.

@@ -17,6 +17,7 @@ from ..data.verdict import Verdict
 from .places import Place, cell_at, cells_at, object_at
 
 if TYPE_CHECKING:
+    from ..data.store.walk_folder import WalkFolder
     from ..verify.findings import VerifyResult
     from .export.run import Kind
 
@@ -152,6 +153,12 @@ class Bake(BakeFolder):
         from .report.run import report
 
         return report(self, cells=cells, out=out, curves=curves)
+
+    def pack(self, out: str | Path | None = None, *, flatten: bool = False, overwrite: bool = False) -> "WalkFolder":
+        """Write the display database that a walkthrough reads; as `viewcell.pack`."""
+        from .pack.run import pack
+
+        return pack(self, out, flatten=flatten, overwrite=overwrite)
 
     def export(self, kind: "Kind", out: str | Path, *, overwrite: bool = False) -> Path:
         """Write it for engines and other tools; docs/guides/export.md says what each kind holds.

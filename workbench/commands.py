@@ -436,3 +436,30 @@ def export(options: argparse.Namespace) -> int:
         say(f"{counted(graph.tile_count, 'leaf', 'leaves')}, {counted(graph.portal_count, 'portal')}, {unit}")
         say(f"viewcell check {options.prt} --pvs SETS judges the sets that another tool computes for it")
     return 0
+
+
+def pack(options: argparse.Namespace) -> int:
+    """Write a display database and say how large it is, or check one."""
+    from .pack.words import pack_text
+
+    if options.check:
+        from ..data.store.walk_folder import read_walk
+
+        if options.out or options.flatten or options.overwrite:
+            raise InputError("pack: expected nothing to write beside --check")
+        walk = read_walk(options.bake)
+        say(pack_text(walk))
+        if stale := walk.stale():
+            complain(stale)
+        return FAILED if stale else 0
+    from ..data.store.bake_folder import read_bake
+    from .pack.run import default_out
+    from .pack.run import pack as write
+
+    made = read_bake(options.bake)
+    out = Path(options.out) if options.out else default_out(made)
+    before = _stamp(out)
+    walk = write(made, out, flatten=options.flatten, overwrite=options.overwrite)
+    say(pack_text(walk))
+    say(f"written to {out}" if _stamp(out) != before else f"{out} was up to date; --overwrite packs it again")
+    return 0

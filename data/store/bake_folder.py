@@ -24,6 +24,7 @@ from ..rows import Rows
 from ..scene import Scene, turned
 from ..verdict import Verdict
 from . import certificates, room_tables
+from .framed import FramedFolder
 from .graph_folder import CELL_COLUMNS, PORTAL_COLUMNS, plan_column, read_graph
 from .scene_folder import new_folder, read_manifest, read_table
 from .scene_tables import meshes_table, objects_table, scene_from_tables
@@ -41,30 +42,8 @@ TABLES = (
 LEAKS = ("cell_id", "reached_cell_id", "object_id")
 
 
-class BakeFolder:
-    """A finished bake: the model, its cells and portals, and what is visible from where.
-
-    Attributes:
-        folder: where it is stored.
-        manifest: contents of manifest.json.
-        grid_m: grid step [m].
-        origin: whole metres subtracted from the model's coordinates, float64 x 3.
-        yaw_deg: the model was then turned back by this about the vertical [degrees].
-    """
-
-    def __init__(self, folder: Path, manifest: dict) -> None:
-        self.folder = folder
-        self.manifest = manifest
-        self.grid_m = float(manifest["grid_m"])
-        self.origin = np.array(manifest["origin"], np.float64)
-        self.yaw_deg = float(manifest.get("yaw_deg", 0.0))
-
-    def in_model(self, points: np.ndarray) -> np.ndarray:
-        """Points of the bake's tables [m] in the model's own coordinates, shape (..., 3), float64.
-
-        A direction is the difference of two points.
-        """
-        return turned(np.asarray(points, np.float64), self.yaw_deg) + self.origin
+class BakeFolder(FramedFolder):
+    """A finished bake: the model, its cells and portals, and what is visible from where."""
 
     def in_bake(self, points: np.ndarray) -> np.ndarray:
         """Points of the model's own coordinates [m] in those of the bake's tables: the inverse of `in_model`."""

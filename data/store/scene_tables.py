@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pyarrow as pa
 
+from ..animation import Animation
 from ..errors import InputError
 from ..ragged import starts_of
 from ..scene import Definition, Instance, Mesh, NamedStorey, Role, Scene, Space
@@ -37,9 +38,9 @@ def meshes_table(scene: Scene) -> pa.Table:
             "definition_id": pa.array([i for i, _, _ in rows], pa.int32()),
             "lod": pa.array([lod for _, lod, _ in rows], pa.int32()),
             "error_m": pa.array([mesh.error_m for _, _, mesh in rows], pa.float64()),
-            "vertices": _lists(vertices, np.float32),
-            "faces": _lists([mesh.faces for _, _, mesh in rows], np.int32),
-            **_colour_columns([mesh for _, _, mesh in rows]),
+            "vertices": list_column(vertices, np.float32),
+            "faces": list_column([mesh.faces for _, _, mesh in rows], np.int32),
+            **colour_columns([mesh for _, _, mesh in rows]),
         },
         metadata={"definition_names": json.dumps([shape.name for shape in scene.definitions])},
     )
@@ -56,15 +57,29 @@ def objects_table(scene: Scene) -> pa.Table:
         "name": pa.array([placed.name for placed in scene.objects], pa.string()),
         "kind": pa.array([placed.kind for placed in scene.objects], pa.string()),
         "definition_id": pa.array([placed.definition_id for placed in scene.objects], pa.int32()),
-        "transform": _lists([placed.transform for placed in scene.objects], np.float64),
+        "transform": list_column([placed.transform for placed in scene.objects], np.float64),
         "opaque": pa.array([placed.opaque for placed in scene.objects], pa.bool_()),
         "role": pa.array([placed.role.value for placed in scene.objects], pa.string()),
         "guid": pa.array([placed.guid or None for placed in scene.objects], pa.string()),
     }
-    columns |= _box_columns(boxes * scene.grid_m, empty=boxes[:, 0, 0] > boxes[:, 1, 0])
+    columns |= box_columns(boxes * scene.grid_m, empty=boxes[:, 0, 0] > boxes[:, 1, 0])
     columns |= storey_columns([placed.storey for placed in scene.objects])
     columns["materials"] = pa.array([placed.materials for placed in scene.objects], pa.list_(pa.string()))
-    return pa.table(columns)
+    # Most models have none of these; their folders stay as they were before there were such.
+    more = look_columns(scene.objects)
+    return pa.table(columns | {name: column for name, column in more.items() if column.null_count < len(column)})
+
+
+def look_columns(objects: list[Instance]) -> dict[str, pa.Array]:
+    """Colours (0xRRGGBBAA), motions and their periods [s] of objects, null where there are none or no end."""
+    moving = [placed.animation for placed in objects]
+    periods = [None if one is None or one.period_s == np.inf else one.period_s for one in moving]
+    colours = [None if placed.colour is None else int.from_bytes(placed.colour, "big") for placed in objects]
+    return {
+        "colour": pa.array(colours, pa.uint32()),
+        "animation": pa.array([None if one is None else one.text for one in moving], pa.string()),
+        "period_s": pa.array(periods, pa.float64()),
+    }
 
 
 def storey_columns(storeys: list[NamedStorey | None]) -> dict[str, pa.Array]:
@@ -93,15 +108,15 @@ def spaces_table(spaces: list[Space]) -> pa.Table:
     return pa.table(
         {
             "name": pa.array([space.name for space in spaces], pa.string()),
-            "vertices": _lists([space.vertices for space in spaces], np.float64),
-            "faces": _lists([space.faces for space in spaces], np.int32),
+            "vertices": list_column([space.vertices for space in spaces], np.float64),
+            "faces": list_column([space.faces for space in spaces], np.int32),
         }
     )
 
 
 def openings_table(openings: np.ndarray) -> pa.Table:
     """`openings.parquet`: one row for each box of shape (n, 2, 3), metres."""
-    return pa.table(_box_columns(np.asarray(openings, np.float64).reshape(-1, 2, 3)))
+    return pa.table(box_columns(np.asarray(openings, np.float64).reshape(-1, 2, 3)))
 
 
 def scene_from_tables(
@@ -156,8 +171,8 @@ def _definitions(meshes: pa.Table) -> list[Definition]:
     names = json.loads((meshes.schema.metadata or {}).get(b"definition_names", b"[]"))
     ids, lods = meshes["definition_id"].to_pylist(), meshes["lod"].to_pylist()
     errors = meshes["error_m"].to_pylist()
-    vertices, faces = _arrays(meshes["vertices"], 3), _arrays(meshes["faces"], 3)
-    colours = _colours(meshes, faces)
+    vertices, faces = list_rows(meshes["vertices"], 3), list_rows(meshes["faces"], 3)
+    colours = colours_of(meshes, faces)
     levels: list[list[Mesh]] = []
     for row, (definition_id, lod) in enumerate(zip(ids, lods, strict=True)):
         where = f"meshes.parquet: row {row}"
@@ -172,7 +187,7 @@ def _definitions(meshes: pa.Table) -> list[Definition]:
     return [Definition(name, tuple(meshes)) for name, meshes in zip(names, levels, strict=True)]
 
 
-def _colour_columns(meshes: list[Mesh]) -> dict[str, pa.Array]:
+def colour_columns(meshes: list[Mesh]) -> dict[str, pa.Array]:
     """Base colours by runs of faces: where each run begins, and its 0xRRGGBBAA; empty lists where none is known."""
     starts, colours = [], []
     for mesh in meshes:
@@ -180,16 +195,21 @@ def _colour_columns(meshes: list[Mesh]) -> dict[str, pa.Array]:
         begins = np.flatnonzero(np.append(np.ones(min(1, len(packed)), bool), packed[1:] != packed[:-1]))
         starts.append(begins)
         colours.append(packed[begins])
-    return {"colour_starts": _lists(starts, np.int32), "colours": _lists(colours, np.uint32)}
+    return {"colour_starts": list_column(starts, np.int32), "colours": list_column(colours, np.uint32)}
 
 
-def _colours(meshes: pa.Table, faces: list[np.ndarray]) -> list[np.ndarray | None]:
+def colours_of(meshes: pa.Table, faces: list[np.ndarray]) -> list[np.ndarray | None]:
+    """Colours of the faces of each row, (m, 4), uint8, from the columns of `colour_columns`; None where there are none.
+
+    Raises:
+        InputError: runs that are none.
+    """
     # Folders of before 0.2 have no colours.
     if "colours" not in meshes.column_names:
         return [None] * len(faces)
     found: list[np.ndarray | None] = []
     for row, (begins, packed) in enumerate(
-        zip(_arrays(meshes["colour_starts"], 1), _arrays(meshes["colours"], 1), strict=True)
+        zip(list_rows(meshes["colour_starts"], 1), list_rows(meshes["colours"], 1), strict=True)
     ):
         lengths = np.diff(np.append(begins.ravel(), len(faces[row])))
         if len(begins) != len(packed) or (len(begins) and (begins[0, 0] != 0 or (lengths < 0).any())):
@@ -203,10 +223,12 @@ def _colours(meshes: pa.Table, faces: list[np.ndarray]) -> list[np.ndarray | Non
 def _objects(objects: pa.Table) -> list[Instance]:
     columns = ("object_id", "name", "kind", "definition_id", "role")
     # Older folders have no GUIDs, storeys and materials.
-    words = optional(objects, "guid"), _storeys(objects), optional(objects, "materials")
-    rows = zip(*(objects[name].to_pylist() for name in columns), _arrays(objects["transform"], 4), *words, strict=True)
+    words = optional(objects, "guid"), _storeys(objects), optional(objects, "materials"), _looks(objects)
+    rows = zip(
+        *(objects[name].to_pylist() for name in columns), list_rows(objects["transform"], 4), *words, strict=True
+    )
     found = []
-    for row, (object_id, name, kind, definition_id, role, transform, guid, storey, materials) in enumerate(rows):
+    for row, (object_id, name, kind, definition_id, role, transform, guid, storey, materials, look) in enumerate(rows):
         where = f"objects.parquet: row {row}"
         if object_id != row:
             raise InputError(f"{where}: expected object_id {row}, found {object_id}")
@@ -214,7 +236,7 @@ def _objects(objects: pa.Table) -> list[Instance]:
             raise InputError(f"{where}: expected role occluder, detail or transparent, found {role!r}")
         if transform.shape != (4, 4) or not np.isfinite(transform).all():
             raise InputError(f"{where}: expected a transform of 16 finite numbers, found {transform.size}")
-        more = {"storey": storey, "materials": tuple(materials or ())}
+        more = {"storey": storey, "materials": tuple(materials or ()), **look}
         found.append(Instance(name, kind, definition_id, transform.astype(np.float64), Role(role), guid or "", **more))
     return found
 
@@ -222,6 +244,17 @@ def _objects(objects: pa.Table) -> list[Instance]:
 def optional(table: pa.Table, name: str) -> list:
     """Values of a column that older folders lack: then all None."""
     return table[name].to_pylist() if name in table.column_names else [None] * table.num_rows
+
+
+def _looks(table: pa.Table) -> list[dict]:
+    """Colour and motion of each object, as `Instance` takes them."""
+    columns = (optional(table, name) for name in ("colour", "animation", "period_s"))
+    found = []
+    for colour, text, period in zip(*columns, strict=True):
+        shown = None if colour is None else tuple(colour.to_bytes(4, "big"))
+        moving = None if text is None else Animation(text, np.inf if period is None else period)
+        found.append({"colour": shown, "animation": moving})
+    return found
 
 
 def _storeys(table: pa.Table) -> list[NamedStorey | None]:
@@ -234,7 +267,7 @@ def _spaces(spaces: pa.Table, rooms: pa.Table | None) -> list[Space]:
         rooms = pa.table({"room_id": pa.array(range(spaces.num_rows))})
     if rooms["room_id"].to_pylist() != list(range(spaces.num_rows)):
         raise InputError(f"rooms.parquet: expected a row for each of {spaces.num_rows} rooms in order, found others")
-    vertices, faces = _arrays(spaces["vertices"], 3), _arrays(spaces["faces"], 3)
+    vertices, faces = list_rows(spaces["vertices"], 3), list_rows(spaces["faces"], 3)
     for row in range(spaces.num_rows):
         _check_faces(faces[row], len(vertices[row]), f"spaces.parquet: row {row}")
     words = zip(*([text or "" for text in optional(rooms, name)] for name in ("long_name", "guid")), strict=True)
@@ -255,7 +288,7 @@ def _check_faces(faces: np.ndarray, vertex_count: int, where: str) -> None:
         raise InputError(f"{where}: expected vertex indices below {vertex_count}, found {faces.min()} to {faces.max()}")
 
 
-def _lists(arrays: list[np.ndarray], dtype: type) -> pa.ListArray:
+def list_column(arrays: list[np.ndarray], dtype: type) -> pa.ListArray:
     """A list column from arrays of any shape, read row by row."""
     flat = [np.asarray(array, dtype).ravel() for array in arrays]
     offsets = starts_of([len(array) for array in flat]).astype(np.int32)
@@ -263,7 +296,7 @@ def _lists(arrays: list[np.ndarray], dtype: type) -> pa.ListArray:
     return pa.ListArray.from_arrays(pa.array(offsets), pa.array(values))
 
 
-def _arrays(column: pa.ChunkedArray, width: int) -> list[np.ndarray]:
+def list_rows(column: pa.ChunkedArray, width: int) -> list[np.ndarray]:
     """Rows of a list column, each of shape (n, width)."""
     column = column.combine_chunks()
     values, offsets = column.values.to_numpy(zero_copy_only=False), column.offsets.to_numpy()
@@ -272,6 +305,7 @@ def _arrays(column: pa.ChunkedArray, width: int) -> list[np.ndarray]:
     return [values[a:b].reshape(-1, width) for a, b in pairwise(offsets)]
 
 
-def _box_columns(boxes: np.ndarray, empty: np.ndarray | None = None) -> dict[str, pa.Array]:
+def box_columns(boxes: np.ndarray, empty: np.ndarray | None = None) -> dict[str, pa.Array]:
+    """Columns of boxes of shape (n, 2, 3), null where a mask says so."""
     flat = boxes.reshape(-1, 6)
     return {name: pa.array(flat[:, i], pa.float64(), mask=empty) for i, name in enumerate(BOX_COLUMNS)}

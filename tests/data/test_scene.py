@@ -91,3 +91,17 @@ def test_owners_and_roles():
 def test_missing_file_is_one_clear_line(tmp_path):
     with pytest.raises(InputError, match="expected a model file or folder, found nothing"):
         source_path(tmp_path / "no.ifc")
+
+
+def test_an_object_may_have_a_shape_of_its_own_at_some_levels():
+    """The other levels stay the very meshes of its definition, and no other object changes."""
+    levels = tuple(Mesh(np.eye(3) * k, np.array([[0, 1, 2]], np.int32), 0.1 * k) for k in range(3))
+    scene = Scene([Definition("chair", levels)], [Instance(str(i), "", 0, np.eye(4), Role.DETAIL) for i in range(3)])
+    own = Mesh(np.eye(3) * 9, np.array([[0, 1, 2]], np.int32), 0.15)
+    other = scene.with_own_geometry(1, {1: own})
+    assert [placed.definition_id for placed in other.objects] == [0, 1, 0] and len(scene.definitions) == 1
+    assert [a is b for a, b in zip(other.definitions[1].lods, levels, strict=True)] == [True, False, True]
+    assert other.definitions[1].lods[1] is own
+    for lod in (-1, 3):
+        with pytest.raises(InputError, match=f"object 1: expected a level below 3, found {lod}"):
+            scene.with_own_geometry(1, {lod: own})

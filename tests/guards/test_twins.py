@@ -24,6 +24,8 @@ TWINS = {
     "launch_occludees": ("occludee", "exact.occludee.covers_box", "kernels/test_coverage.py"),
     "launch_deviation": ("deviation", "exact.deviation.deviation_squared", "kernels/test_deviation.py"),
     "launch_select": ("select", "exact.select.best_by_table", "kernels/test_select.py"),
+    "launch_near_columns": ("tour", "exact.tour.nearest", "kernels/test_tour.py"),
+    "launch_tour": ("tour", "exact.tour.least_runs", "kernels/test_tour.py"),
     "launch_raster": ("raster", "exact.raster.first_hit", "kernels/test_raster.py"),
 }
 # Kernels that answer another file's question in their own way have its twin: `stab_batch` is the plain stab, both

@@ -202,6 +202,23 @@ class KnapsackCase:
 
 
 @dataclass(frozen=True)
+class TourCase:
+    """How few runs of ones can rows have, over all orders of their columns?
+
+    Attributes:
+        name: unique.
+        expected: the fewest.
+        rows: of the characters 0 and 1, equally long.
+        origin: where the case came from.
+    """
+
+    name: str
+    expected: int
+    rows: list[str]
+    origin: str
+
+
+@dataclass(frozen=True)
 class HardCases:
     """All cases of a folder, by kind."""
 
@@ -215,6 +232,7 @@ class HardCases:
     graph: list[GraphCase]
     model: list[ModelCase]
     knapsack: list[KnapsackCase]
+    tour: list[TourCase]
 
     def count(self) -> int:
         """Number of cases."""
@@ -440,6 +458,13 @@ def _knapsack(name: str, expected: str, budget: str, objects: str, origin: str) 
     return KnapsackCase(name, None if expected == "-" else int(expected), int(budget), levels, origin)
 
 
+def _tour(name: str, expected: str, rows: str, origin: str) -> TourCase:
+    lines = [row.strip() for row in rows.split("|")]
+    if int(expected) < 0 or len(set(map(len, lines))) > 1 or not lines[0] or not set("".join(lines)) <= set("01"):
+        raise ValueError
+    return TourCase(name, int(expected), lines, origin)
+
+
 def _loader(form: str, build: Callable[..., Case]) -> Callable[[Path], list[Case]]:
     return lambda path: _lines(path, form, build)
 
@@ -455,4 +480,5 @@ LOADERS: dict[str, Callable[[Path], list]] = {
     "graph": _loader("name; cells; portals; seen; traces; origin", _graph),
     "model": _loader("name; objects; cells; seen; origin", _model),
     "knapsack": _loader("name; expected; budget; objects; origin", _knapsack),
+    "tour": _loader("name; expected; rows; origin", _tour),
 }

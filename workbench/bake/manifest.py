@@ -74,6 +74,8 @@ def fingerprint(scene: Scene | None, graph_folder: Path | None, settings: Settin
         digest.update(repr((placed.name, placed.kind, placed.definition_id, placed.role, placed.guid)).encode())
         digest.update(placed.transform.tobytes())
         digest.update(repr((placed.storey, placed.materials)).encode())
+        if placed.colour or placed.animation:
+            digest.update(repr((placed.colour, placed.animation)).encode())
     for space in scene.spaces:
         digest.update(space.name.encode() + space.vertices.tobytes() + space.faces.tobytes())
         digest.update(repr((space.long_name, space.guid, space.storey)).encode())

@@ -91,8 +91,8 @@ def set_aside(report: Path) -> None:
 
 
 @contextlib.contextmanager
-def alone(out: Path) -> Iterator[None]:
-    """No other bake of this machine writes to a place meanwhile.
+def alone(out: Path, what: str = "bake") -> Iterator[None]:
+    """Nobody else on this machine writes a bake, or what else it is, to a place meanwhile.
 
     Raises:
         InputError: another one does.
@@ -101,7 +101,7 @@ def alone(out: Path) -> Iterator[None]:
     try:
         lock.acquire()
     except Timeout:
-        raise InputError(f"{out}: expected no bake that is being written there, found one; wait for it") from None
+        raise InputError(f"{out}: expected no {what} that is being written there, found one; wait for it") from None
     try:
         yield
     finally:

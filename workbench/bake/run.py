@@ -23,6 +23,7 @@ from ...data.store.bake_folder import CELL_LODS, leaks_table, portals_table, wri
 from ...data.store.certificates import certificate_tables, join_proofs
 from ...data.store.room_tables import room_tables
 from ...data.store.scene_folder import held_manifest
+from ...data.sweep import moving, still, with_moving
 from ...solvers.levels.pixel_error import pixel_levels
 from ..baked import Bake
 from . import blocks
@@ -135,16 +136,29 @@ def _bake(model: Scene | str | Path, settings: Settings, overwrite: bool, tuned:
         sources = bare_sources(graph_folder, settings, clock)
     else:
         scene, notes = _detailed(scene, settings, run)
-        sources = model_sources(PreparedModel(scene), settings, clock)
+        sources = model_sources(PreparedModel(_without_motion(scene, settings)), settings, clock)
+        # Of the model as it is, with what moves.
+        notes["counts"] = sources.facts["counts"] | {"definitions": len(scene.definitions)}
     sources.facts |= notes
     if not sources.graph.inhabitable.any():
         raise InputError(f"{sources.facts['source']}: expected at least one inhabitable cell, found none")
     try:
-        return _write(sources, settings, run, tuned)
+        return _write(sources, scene, settings, run, tuned)
     except KeyboardInterrupt:
         if any(partial_folder(out, known).glob("*.arrow")):
             raise Interrupted from None
         raise
+
+
+def _without_motion(scene: Scene, settings: Settings) -> Scene:
+    """The model with boxes for what moves.
+
+    Raises:
+        InputError: a motion without bounds; or certificates are wanted, which are of shapes as they stand.
+    """
+    if settings.certify and len(moving(scene)):
+        raise InputError(f"certify: expected a model in which nothing moves, found object {moving(scene)[0]} that does")
+    return still(scene)
 
 
 def open_model(model: Scene | str | Path, settings: Settings) -> tuple[Scene | None, Path | None]:
@@ -185,14 +199,15 @@ def _detailed(scene: Scene, settings: Settings, run: _Run) -> tuple[Scene, dict]
     return scene, notes
 
 
-def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dict]) -> Bake:
-    """Compute visibility, and all that follows from it, and write the folder."""
+def _write(sources: Sources, scene: Scene | None, settings: Settings, run: _Run, tuned: dict[str, dict]) -> Bake:
+    """Compute visibility of the model as it is, and all that follows from it, and write the folder."""
     cell_rows, object_rows, extra, short = _visibility(sources, settings, run)
     graph, facts, clock = sources.graph, sources.facts, run.clock
+    if scene is not None and len(ids := moving(scene)):
+        object_rows = with_moving(object_rows, sources.model.scene, ids, graph.cells, graph.inhabitable)
     facts |= {"budget_spent": short is not None, **tuned}
     if short is not None:
         facts["budget"] = {"budget_s": run.budget_s, **asdict(short)}
-    scene = None if sources.model is None else sources.model.scene
     if sources.closed is not None:
         clock.show("leaks")
         extra |= _leaks(sources, (cell_rows, object_rows), settings, run)
@@ -206,7 +221,7 @@ def _write(sources: Sources, settings: Settings, run: _Run, tuned: dict[str, dic
     facts |= worth(sources.model, graph, pairs, facts, settings.seed)
     clock.lap("eyes")
     if scene is not None and settings.lods:
-        extra["cell_lods"] = _cell_lods(scene, graph, object_rows, settings)
+        extra["cell_lods"] = _cell_lods(sources.model.scene, graph, object_rows, settings)
         clock.lap("levels of detail")
 
     if scene is not None and scene.spaces:

@@ -41,6 +41,8 @@ KERNELS = {
     "raster": "meshes",
     "deviation": "meshes",
     "select": "solvers",
+    "tour": "sets",
+    "runs": "sets",
     "projection_point": "solvers",
 }
 SIZES = {
@@ -56,6 +58,8 @@ SIZES = {
         "raster": (4_800, 19_200, 76_800),
         "deviation": (80, 320, 1_280),
         "select": (100, 1_000, 10_000),
+        "tour": (500, 2_000, 8_000),
+        "runs": (500, 2_000, 8_000),
         "projection_point": (10, 100, 400),
     },
     "full": {
@@ -70,6 +74,8 @@ SIZES = {
         "raster": (19_200, 76_800, 307_200),
         "deviation": (320, 1_280, 5_120),
         "select": (1_000, 10_000, 100_000),
+        "tour": (2_000, 8_000, 20_000),
+        "runs": (2_000, 8_000, 20_000),
         "projection_point": (100, 400, 1_000),
     },
 }

@@ -107,6 +107,8 @@ class _Writer:
         mesh = self._scene.definitions[placed.definition_id].lods[0]
         linear = placed.transform[:3, :3]
         fallback = COLOURS[material_name(placed.role, placed.kind)]
+        if placed.colour is not None:
+            fallback = tuple(c / 255 for c in placed.colour)
         if _skewed(linear):
             # No rotation and scale make this transform, which is all that a node may have: the vertices move instead.
             moved = mesh.vertices @ linear.T + placed.transform[:3, 3]

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from ...kernels.launch import Device
 from ...verify.cases.hard_cases import HardCases
-from . import bakes, meshes, searches, shadows
+from . import bakes, meshes, orders, searches, shadows
 from .outcomes import Outcomes
 
 KERNELS: dict[str, Callable[[HardCases, Device], Outcomes]] = {
@@ -25,6 +25,8 @@ KERNELS: dict[str, Callable[[HardCases, Device], Outcomes]] = {
     "launch_select": meshes.select,
     "launch_deviation": meshes.deviation,
     "launch_raster": meshes.raster,
+    "launch_near_columns": orders.near_columns,
+    "launch_tour": orders.tour,
     "vlod_hidden": shadows.vlod,
     "solve_points": shadows.points,
     "bake portals": bakes.bakes_by("portals"),

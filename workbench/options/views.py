@@ -85,3 +85,25 @@ def add_export(commands: argparse._SubParsersAction) -> None:
         help="a tileset that shows to an eye in a view cell what it may see, and the same as a draft of glTF",
     )
     export.add_argument("--overwrite", action="store_true", help="replace what is there")
+
+
+def add_pack(commands: argparse._SubParsersAction) -> None:
+    """`viewcell pack`."""
+    pack = command(
+        commands,
+        "pack",
+        "pack",
+        "Write the display database that a walkthrough reads: levels of detail in one file, sets as runs.",
+        ["pack house.bake", "pack house.bake -o house.walk --flatten", "pack --check house.walk"],
+    )
+    pack.add_argument("bake", metavar="BAKE", help="bake folder of a model; with --check, a display database")
+    pack.add_argument("-o", "--out", metavar="FOLDER", help="folder to write; BAKE's name with .walk by default")
+    pack.add_argument(
+        "--flatten", action="store_true", help="give every object a copy of its shape; shared shapes by default"
+    )
+    pack.add_argument("--overwrite", action="store_true", help="replace a display database of another bake, too")
+    pack.add_argument(
+        "--check",
+        action="store_true",
+        help="write nothing: check every file of a display database, and whether its bake has changed since",
+    )

@@ -24,10 +24,11 @@ from viewcell.verify.exact.occludee import covers_box
 from viewcell.verify.exact.region import region_visible
 from viewcell.verify.exact.select import best_by_table
 from viewcell.verify.exact.sightline import Sight, Sightlines
+from viewcell.verify.exact.tour import as_columns, least_runs
 from viewcell.verify.exact.trace import portal_links, portal_path
 from viewcell.workbench.bake.settings import METHODS
 from viewcell.workbench.cli import main
-from viewcell.workbench.hard import bakes, meshes, searches, shadows
+from viewcell.workbench.hard import bakes, meshes, orders, searches, shadows
 from viewcell.workbench.hard import run as hard_cases
 from viewcell.workbench.hard.bakes import write_model
 from viewcell.workbench.hard.kernels import KERNELS
@@ -43,8 +44,8 @@ LONG += tuple(f"bake {m}" for m in METHODS[1:])
 MOST_WITHHELD = {
     "launch_target_search": 18, "launch_line_trees": 13, "launch_confirm": 5, "launch_aim": 3, "launch_shaft": 15,
     "launch_umbra": 51, "launch_shrink": 62, "launch_coverage": 20, "launch_occludees": 84, "launch_backface": 1,
-    "launch_select": 2, "launch_raster": 3, "bake portals": 5, "bake occluders": 1, "bake both": 1, "bake vlod": 1,
-    "vlod_hidden": 82, "solve_points": 162,
+    "launch_select": 2, "launch_raster": 3, "launch_tour": 4, "bake portals": 5, "bake occluders": 1,
+    "bake both": 1, "bake vlod": 1, "vlod_hidden": 82, "solve_points": 162,
 }  # fmt: skip
 
 
@@ -145,6 +146,11 @@ def knapsack_answer(case):
     return found and found.value
 
 
+def tour_answer(case):
+    """The fewest runs over all orders."""
+    return least_runs(as_columns(case.rows))
+
+
 def said(case):
     return case.expected
 
@@ -161,6 +167,7 @@ ANSWERS = {
     "traces": (CASES.graph, traces_answer, lambda case: [trace.reached for trace in case.traces], 1),
     "model": (CASES.model, model_answer, lambda case: case.seen, 18),
     "knapsack": (CASES.knapsack, knapsack_answer, said, 1),
+    "tour": (CASES.tour, tour_answer, said, 4),
 }
 
 
@@ -275,6 +282,8 @@ BROKEN = {
     "launch_clip": ("launch_clip", lambda found: found // 2),
     "launch_deviation": ("launch_deviation", lambda found: replace(found, upper=found.upper / 2)),
     "launch_raster": ("launch_raster", lambda images: replace(images, ids=images.ids + 1)),
+    "launch_near_columns": ("launch_near_columns", lambda near: near[:, ::-1]),
+    "launch_tour": ("launch_tour", np.sort),
     "launch_select": ("launch_select", lambda found: replace(found, bound=found.bound / 2)),
     "vlod_hidden": ("vlod_hidden", lambda found: (np.ones_like(found[0]), found[1])),
     "solve_points": ("launch_occludees", np.zeros_like),
@@ -287,7 +296,7 @@ BROKEN = {
 
 def spoil_all(monkeypatch, name, spoil):
     """Spoil what a kernel says wherever the hard cases ask it."""
-    for module in (bakes, meshes, searches, shadows):
+    for module in (bakes, meshes, orders, searches, shadows):
         if launch := getattr(module, name, None):
             monkeypatch.setattr(module, name, lambda *work, launch=launch, **options: spoil(launch(*work, **options)))
 
@@ -365,6 +374,7 @@ GOOD = {
     "graph": "a; 0 0 0, 4 4 4 | 4 0 0, 8 4 4; 0 1: 4 1 1, 4 2 2; 0 1; 0 -: 1 1 1, 9 1 1 | 0 1: 1 1 1, 5 1 1; by hand",
     "model": "a; occluder: 0 0 0, 1 1 1 / detail: 0 0 0.5, 1 0 0, 0 1 0; 5 0 0, 6 1 1; 0 0, 0 1; by hand",
     "knapsack": "a; 7; 5; 0 0, 7 5 | 2 0; by hand",
+    "tour": "a; 2; 1010 | 0101; by hand",
 }
 # What is written instead of what.
 BAD = {
@@ -412,6 +422,7 @@ BAD = {
         ("9 1 1 |", "9 1 1, 1 1 1 |"),
     ],
     "knapsack": [("7;", "x;"), ("; 5;", "; -5;"), ("7 5", "7"), ("7 5", "7 -5"), ("7 5", "7 5.5"), (" | 2 0", " |")],
+    "tour": [("2;", "x;"), ("2;", "-2;"), ("0101", "010"), ("1010", "1020"), ("1010 |", "|"), ("1010 | 0101", "|")],
     "model": [("occluder", "wall"), ("0 0, 0 1;", "0 0, 1 0;"), ("0 0, 0 1;", "0 0, 0 2;"), ("0 0 0.5", "0 0 x")],
 }
 

@@ -35,6 +35,8 @@ SMALL = {
     "raster": (1_200,),
     "deviation": (80,),
     "select": (20, 40),
+    "tour": (60,),
+    "runs": (60,),
     "projection_point": (4,),
 }
 

@@ -78,3 +78,15 @@ def test_indices_are_as_short_as_may_be(count, kind):
     document, _ = gltf_reader.split(data)
     assert [a["componentType"] for a in document["accessors"] if a["type"] == "SCALAR"] == [kind]
     assert gltf_reader.drawn(data)[0][1].tolist() == [points[[0, 1, count - 1]].tolist()]
+
+
+def test_an_object_has_its_own_colour_where_its_faces_have_none():
+    """Two instances of a bare shape, one of them red; and a coloured shape, which keeps its colours."""
+    faces = np.array([[0, 1, 2]], np.int32)
+    green = np.array([[20, 160, 90, 255]], np.uint8)
+    shapes = [Definition("bare", (Mesh(np.eye(3), faces),)), Definition("green", (Mesh(np.eye(3), faces, 0.0, green),))]
+    red = (200, 30, 10, 255)
+    placed = [Instance(f"{i} {c}", "Thing", i, np.eye(4), Role.DETAIL, colour=c) for i in (0, 1) for c in (None, red)]
+    data = objects_as_glb(Scene(shapes, placed), range(4), np.eye(4))
+    shown = [np.round(255 * colours[0]).astype(int).tolist() for _, _, colours in gltf_reader.drawn(data)]
+    assert shown[1] == list(red) != shown[0] and shown[2] == shown[3] == green[0].tolist()

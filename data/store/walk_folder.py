@@ -1,0 +1,291 @@
+"""The display database that a walkthrough reads, format 1: X.walk, packed from a bake.
+
+`manifest.json` says of which bake, and has a checksum of every other file. `objects.parquet` has a row for each object;
+its row number is its display id, by which sets are stored. `items.parquet` says where levels of detail lie in
+`geometry.bin`, and `cell_items.parquet` which of them do. `sets.parquet` has what may be visible from each view cell as
+runs (data/runs.py); `cells` in it are rows of `cells.parquet`. docs/reference/walk-folder.md has all columns.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from ..errors import InputError
+from ..ragged import starts_of
+from ..runs import RunSets, decode
+from ..scene import Mesh
+from .framed import FramedFolder
+from .scene_folder import new_folder, one_line, read_manifest, read_table
+from .scene_tables import BOX_COLUMNS, colours_of, list_rows
+from .walk_tables import SHORT, item_size
+
+__all__ = ["WalkFolder", "read_walk"]
+
+FORMAT, KIND = 1, "walk"
+GEOMETRY = "geometry.bin"
+LOOKS = ("colour", "animation", "period_s")
+COLUMNS = {
+    "objects": ("object_id", "name", "kind", "role", "definition_id", "transform", *BOX_COLUMNS, *LOOKS, "items"),
+    "items": ("owner", "lod", "offset", "size", "vertices", "faces", "error_m", "colour_starts", "colours"),
+    "sets": ("cell_id", "potential", "unknown", "cells", "bytes"),
+    "cell_items": ("cell_id", "limits"),
+    "cells": ("cell_id", *BOX_COLUMNS, "inhabitable", "name"),
+    "portals": ("portal_id", "cell_a", "cell_b", "axis", "coordinate", "min_u", "max_u", "min_v", "max_v"),
+}
+MANIFEST_KEYS = ("bake", "grid_m", "origin", "yaw_deg", "flattened", "counts", "files")
+# Tables of a bake that a pack is made of.
+SOURCES = ("meshes", "objects", "cells", "portals", "cell_to_cell", "cell_to_object", "cell_lods")
+# Sets take a third less in these encodings than in Parquet's own.
+BINARY = ("potential", "unknown", "cells", "limits")
+
+
+class WalkFolder(FramedFolder):
+    """A display database: objects, their levels of detail, and what may be visible from where."""
+
+    def __repr__(self) -> str:
+        """What it holds, on a line."""
+        counts = self.manifest["counts"]
+        return f"<WalkFolder {str(self.folder)!r}: {counts['objects']:,} objects, {counts['view_cells']:,} view cells>"
+
+    def _table(self, name: str) -> pa.Table:
+        return read_table(self.folder / f"{name}.parquet", COLUMNS[name])
+
+    @cached_property
+    def objects(self) -> pa.Table:
+        """Objects by display id; `items` are those of its levels, the finest first. Boxes and transforms in metres."""
+        return self._table("objects")
+
+    @cached_property
+    def items(self) -> pa.Table:
+        """Levels of detail as they lie in `geometry.bin`; `owner` is a definition_id, if flattened an object_id."""
+        return self._table("items")
+
+    @cached_property
+    def cells(self) -> pa.Table:
+        """All cells, as in the bake, in an order in which sets of cells are few runs."""
+        return self._table("cells")
+
+    @cached_property
+    def portals(self) -> pa.Table:
+        """Portals, as in the bake."""
+        return self._table("portals")
+
+    @cached_property
+    def sets(self) -> pa.Table:
+        """A row for each view cell, by cell_id: codes of its sets, and bytes of the items that it may need."""
+        return self._table("sets")
+
+    @cached_property
+    def potential(self) -> RunSets:
+        """Display ids that may be visible, a set for each row of `sets`."""
+        return self._runs("potential", self.objects.num_rows)
+
+    @cached_property
+    def unknown(self) -> RunSets:
+        """Those of them that no witness shows."""
+        return self._runs("unknown", self.objects.num_rows)
+
+    @cached_property
+    def potential_cells(self) -> RunSets | None:
+        """Rows of `cells` that may be visible, for each row of `sets`; None if the bake claims nothing of cells."""
+        return None if self.sets["cells"].null_count else self._runs("cells", self.cells.num_rows)
+
+    @cached_property
+    def limits(self) -> np.ndarray:
+        """The coarsest level that does for each member of all sets of `potential`, uint8."""
+        codes = self._table("cell_items")["limits"].to_pylist()
+        return np.frombuffer(b"".join(codes), np.uint8)
+
+    @cached_property
+    def object_items(self) -> tuple[np.ndarray, np.ndarray]:
+        """Items of display id d are the second of the two arrays at the first's [d]:[d + 1], finest first, int64."""
+        rows = [row.ravel() for row in list_rows(self.objects["items"], 1)]
+        return starts_of([len(row) for row in rows]), np.concatenate([np.zeros(0, np.int64), *rows]).astype(np.int64)
+
+    def row_of(self, cell_id: int) -> int:
+        """The row of a view cell's sets.
+
+        Raises:
+            InputError: there is no such view cell.
+        """
+        cells = self.sets["cell_id"].to_numpy()
+        row = int(np.searchsorted(cells, cell_id))
+        if row == len(cells) or cells[row] != cell_id:
+            raise InputError(f"{self.folder}: expected a view cell, found {cell_id}")
+        return row
+
+    def mesh(self, item: int) -> Mesh:
+        """An item read from the file: vertices [m] in its owner's frame, float64, and faces, int32.
+
+        Raises:
+            InputError: there is no such item, or the file is cut short.
+        """
+        if not 0 <= item < self.items.num_rows:
+            raise InputError(f"{self.folder}: expected an item below {self.items.num_rows}, found {item}")
+        row = self.items.slice(item, 1).to_pylist()[0]
+        with (self.folder / GEOMETRY).open("rb") as file:
+            file.seek(row["offset"])
+            data = file.read(row["size"])
+        if len(data) != row["size"]:
+            where = f"{self.folder / GEOMETRY}: expected {row['size']} bytes of item {item}"
+            raise InputError(f"{where}, found {len(data)}")
+        split = 12 * row["vertices"]
+        vertices = np.frombuffer(data[:split], "<f4").reshape(-1, 3).astype(np.float64)
+        kind = "<u2" if row["vertices"] <= SHORT else "<u4"
+        faces = np.frombuffer(data[split:], kind).reshape(-1, 3).astype(np.int32)
+        if faces.size and faces.max() >= len(vertices):
+            raise InputError(f"{self.folder / GEOMETRY}: expected vertices below {len(vertices)} in item {item}")
+        colours = colours_of(self.items.slice(item, 1), [faces])[0]
+        return Mesh(vertices, faces, row["error_m"], colours)
+
+    def stale(self) -> str:
+        """One line if the bake that it was packed from has changed since; empty if not, or if it is not there."""
+        bake = self.manifest["bake"]
+        place = Path(os.path.normpath(self.folder.absolute() / ".." / bake["path"]))
+        if not (place / "manifest.json").is_file() or bake_digest(place) == bake["sha256"]:
+            return ""
+        return f"{self.folder}: its bake {place} has changed since; viewcell pack packs it anew"
+
+    def _runs(self, name: str, count: int) -> RunSets:
+        try:
+            return decode(self.sets[name].to_pylist(), count)
+        except InputError as error:
+            raise InputError(f"{self.folder / 'sets.parquet'}: {name}: {error}") from None
+
+
+def read_walk(folder: str | Path) -> WalkFolder:
+    """Open a display database: every file is as it was written, and all numbers name what there is.
+
+    Raises:
+        InputError: it is none, of another format version, unfinished, or a file is missing, cut short or altered.
+    """
+    folder = Path(folder)
+    manifest = read_manifest(folder, kind=KIND)
+    missing = [name for name in MANIFEST_KEYS if name not in manifest]
+    if missing:
+        raise InputError(f"{folder / 'manifest.json'}: expected the key {missing[0]!r}, found none")
+    try:
+        for name in (*(f"{table}.parquet" for table in COLUMNS), GEOMETRY):
+            if name not in manifest["files"]:
+                raise InputError(f"{folder / 'manifest.json'}: expected a checksum of {name}, found none")
+            _check_file(folder / name, manifest["files"][name])
+        walk = WalkFolder(folder, manifest)
+        _check_numbers(walk)
+    except InputError:
+        raise
+    except (ValueError, TypeError, KeyError, pa.ArrowException) as error:
+        raise InputError(f"{folder}: expected a readable display database, found {one_line(error)}") from None
+    return walk
+
+
+def _check_file(path: Path, known: dict) -> None:
+    try:
+        size = path.stat().st_size
+        if size != known["bytes"]:
+            raise InputError(f"{path}: expected {known['bytes']} bytes, found {size}: it was cut short or altered")
+        if file_digest(path) != known["sha256"]:
+            raise InputError(f"{path}: expected the checksum of the manifest, found another: it was altered")
+    except OSError as error:
+        raise InputError(f"{path}: expected a file of the display database, found {error.strerror}") from None
+
+
+def _check_numbers(walk: WalkFolder) -> None:
+    """Every number names what there is, as far as tables tell."""
+    items, file_size = walk.items, (walk.folder / GEOMETRY).stat().st_size
+    at, size, corners, faces = (items[name].to_numpy() for name in ("offset", "size", "vertices", "faces"))
+    within = (at >= 0) & (at + size <= file_size) & (size == item_size(corners, faces))
+    if not within.all():
+        where = f"{walk.folder / 'items.parquet'}: expected item {np.argmin(within)} within {GEOMETRY}"
+        raise InputError(f"{where}, found it beyond")
+    ids, members = walk.object_items[1], walk.potential.ids()[1]
+    if len(ids) and not (0 <= ids.min() and ids.max() < items.num_rows):
+        raise InputError(f"{walk.folder / 'objects.parquet'}: expected items below {items.num_rows}, found others")
+    where = walk.folder / "cell_items.parquet"
+    if len(walk.limits) != len(members):
+        raise InputError(f"{where}: expected {len(members)} limits of levels, found {len(walk.limits)}")
+    if (walk.limits >= np.diff(walk.object_items[0])[members]).any():
+        raise InputError(f"{where}: expected levels that there are, found others")
+    _ = walk.unknown, walk.potential_cells
+
+
+def write_walk(folder: Path, facts: dict, tables: dict[str, pa.Table], geometry: Iterable[bytes]) -> dict:
+    """Write a display database in one step: it is there whole, or what was there before still is.
+
+    Args:
+        folder: to write.
+        facts: of the manifest, ready for JSON.
+        tables: by name, as COLUMNS has them.
+        geometry: bytes of all items, in order.
+
+    Returns:
+        The manifest.
+
+    Raises:
+        InputError: the folder holds something else, or cannot be written.
+    """
+    with new_folder(folder, KIND, COLUMNS) as temporary:
+        for name, table in tables.items():
+            _write_table(table, temporary / f"{name}.parquet")
+        with (temporary / GEOMETRY).open("wb") as file:
+            file.writelines(geometry)
+        files = {
+            path.name: {"bytes": path.stat().st_size, "sha256": file_digest(path)}
+            for path in sorted(temporary.iterdir())
+        }
+        manifest = facts | {"files": files, "kind": KIND, "format": FORMAT, "complete": True}
+        (temporary / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
+    return manifest
+
+
+def _write_table(table: pa.Table, path: Path) -> None:
+    """Bytes of sets as they are, one after the other with their lengths packed; else Parquet's own choice."""
+    binary = [name for name in BINARY if name in table.column_names]
+    others = [name for name in table.column_names if name not in binary]
+    encoding = dict.fromkeys(binary, "DELTA_LENGTH_BYTE_ARRAY")
+    pq.write_table(
+        table,
+        path,
+        compression="zstd",
+        compression_level=9,
+        use_dictionary=others,
+        column_encoding=encoding or None,
+        write_statistics=others,
+    )
+
+
+def column_bytes(walk: WalkFolder, name: str) -> int:
+    """Bytes that a column of `sets.parquet` takes in the file."""
+    group = pq.ParquetFile(walk.folder / "sets.parquet").metadata.row_group(0)
+    columns = [group.column(k) for k in range(group.num_columns)]
+    return sum(column.total_compressed_size for column in columns if column.path_in_schema == name)
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def bake_digest(folder: Path) -> str:
+    """SHA-256 of what a pack takes from a bake: its tables, and the frame that they are in.
+
+    Raises:
+        InputError: a table cannot be read.
+    """
+    manifest = read_manifest(folder, kind="bake")
+    digest = hashlib.sha256(repr([manifest[name] for name in ("format", "grid_m", "origin")]).encode())
+    digest.update(repr(manifest.get("yaw_deg", 0.0)).encode())
+    for name in SOURCES:
+        path = folder / f"{name}.parquet"
+        try:
+            digest.update(f"{name} {file_digest(path) if path.exists() else 'none'} ".encode())
+        except OSError as error:
+            raise InputError(f"{path}: expected a table, found {error.strerror}") from None
+    return digest.hexdigest()

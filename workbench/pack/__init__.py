@@ -1,0 +1,1 @@
+"""Packing a bake into the display database that a walkthrough reads."""
