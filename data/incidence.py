@@ -107,7 +107,10 @@ def clip_bounds(triangles: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, n
     used[:, :3] = True
     for axis in range(3):
         for side, sign in ((0, 1.0), (1, -1.0)):
-            corners, used = _clip_plane(corners, used, axis, boxes[:, side, axis].astype(float), sign)
+            plane = boxes[:, side, axis].astype(float)
+            # Most triangles end before most sides of their boxes.
+            rows = np.flatnonzero((used & (sign * (corners[:, :, axis] - plane[:, None]) < 0)).any(axis=1))
+            corners[rows], used[rows] = _clip_plane(corners[rows], used[rows], axis, plane[rows], sign)
     low = np.where(used[:, :, None], corners, np.inf).min(axis=1)
     high = np.where(used[:, :, None], corners, -np.inf).max(axis=1)
     left = used.sum(axis=1) >= 3

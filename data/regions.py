@@ -6,7 +6,7 @@ the gaps that walls leave in each other's faces and merges what a model keeps ap
 wall that a person sees. Open, inverted or doubled meshes give no section; they lose occlusion, never safety.
 """
 
-from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -196,7 +196,7 @@ def no_regions() -> Regions:
 
 
 class _Sections:
-    """Sections of closed elements, each computed once where the element is a prism along the axis."""
+    """Sections of closed elements."""
 
     def __init__(
         self, occluders: list[np.ndarray], details: list[np.ndarray], least: float, least_round: float
@@ -219,8 +219,6 @@ class _Sections:
         self._large[oblique, :2] = False
         self._large[:, 2] &= ~oblique | (size[:, 2] < size[:, :2].min(axis=1))
         self._middle = self._boxes.sum(axis=1) // 2
-        self._heights: dict[tuple[int, int], np.ndarray] = {}
-        self._cut: dict[tuple[int, int, int], tuple[np.ndarray, bool]] = {}
 
     def middles(self, axis: int, thin: int) -> np.ndarray:
         """Planes through the middle of thin elements and of those that are no boxes."""
@@ -241,57 +239,48 @@ class _Sections:
         """
         low, high = self._boxes[:, :, axis].T
         begin, end = np.searchsorted(planes, low), np.searchsorted(planes, high, "right")
-        # Plane after plane, so that what is cut once is cut at the lowest of them.
-        place, element = places_of(begin, end - begin), np.repeat(np.arange(len(low)), end - begin)
-        order = np.argsort(place, kind="stable")
-        place, element = place[order], element[order]
-        simple = self._solid_box[element]
-        cuts: dict[tuple[int, int, int], Cut] = {}
-        wanted: dict[tuple[int, int, int], list[int]] = defaultdict(list)
-        for row in np.flatnonzero(~simple & self._large[element, axis]).tolist():
-            k, which = int(planes[place[row]]), int(element[row])
-            for below in (True, False):
-                if low[which] < k if below else k < high[which]:
-                    key = self._cut_at(cuts, (which, axis, k), below=below)
-                    if key is not None:
-                        wanted[key].append(int(place[row]))
-        cut, sections = section_rectangles([cuts[key] for key in wanted])
-        starts = np.searchsorted(cut, np.arange(len(wanted) + 1))
-        times = [len(places) for places in wanted.values()]
-        row = np.repeat(np.arange(len(wanted)), times)
-        at = np.repeat(np.array([k for places in wanted.values() for k in places], np.int64), np.diff(starts)[row])
-        oblique = sections[places_of(starts[row], np.diff(starts)[row])]
-        boxes = self._boxes[element[simple]][:, :, OTHER_AXES[axis]]
-        return np.concatenate([place[simple], at]), np.concatenate([boxes, oblique])
+        boxed = np.flatnonzero(self._solid_box)
+        found = [places_of(begin[boxed], (end - begin)[boxed])]
+        boxes = np.repeat(self._boxes[boxed][:, :, OTHER_AXES[axis]], (end - begin)[boxed], axis=0)
+        cuts: list[Cut] = []
+        served: list[np.ndarray] = []
+        for element in np.flatnonzero(~self._solid_box & self._large[:, axis] & (begin < end)).tolist():
+            for cut, places in self._cuts(element, axis, np.arange(begin[element], end[element]), planes):
+                cuts.append(cut)
+                served.append(places)
+        cut, sections = section_rectangles(cuts)
+        starts = np.searchsorted(cut, np.arange(len(cuts) + 1))
+        row = np.repeat(np.arange(len(cuts)), [len(places) for places in served])
+        found.append(np.repeat(np.concatenate([found[0][:0], *served]), np.diff(starts)[row]))
+        return np.concatenate(found), np.concatenate([boxes, sections[places_of(starts[row], np.diff(starts)[row])]])
 
-    def _cut_at(
-        self, cuts: dict[tuple[int, int, int], Cut], where: tuple[int, int, int], *, below: bool
-    ) -> tuple[int, int, int] | None:
-        """Which section is the one of an element, axis and plane, entered if it is new; None if there is none.
+    def _cuts(
+        self, element: int, axis: int, places: np.ndarray, planes: np.ndarray
+    ) -> Iterator[tuple[Cut, np.ndarray]]:
+        """Sections of an element that is no box by some of the planes, and the places of the planes that each serves.
 
         What is cut, and whether it is a prism there, changes only where the element has a vertex: between two heights
         of vertices a prism has one section. Walls are cut by hundreds of planes.
         """
-        element, axis, k = where
-        heights = self._vertex_heights(element, axis)
-        upper = int(heights[np.searchsorted(heights, k, "left" if below else "right")])
-        if (element, axis, upper) not in self._cut:
-            triangles = self._triangles[element]
-            above = triangles[:, :, axis] >= upper
-            cut = triangles[above.any(axis=1) & ~above.all(axis=1)]
-            self._cut[element, axis, upper] = cut, bool((_normals(cut)[:, axis] == 0).all())
-        cut, prism = self._cut[element, axis, upper]
-        if len(cut) > SECTION_TRIANGLES or not (prism or k == self._middle[element, axis]):
-            return None
-        key = element, upper, 0 if prism else 1 + below
-        cuts.setdefault(key, Cut(cut, axis, k, below))
-        return key
-
-    def _vertex_heights(self, element: int, axis: int) -> np.ndarray:
-        """Coordinates of an element's vertices along an axis, ascending."""
-        if (element, axis) not in self._heights:
-            self._heights[element, axis] = np.unique(self._triangles[element][:, :, axis])
-        return self._heights[element, axis]
+        triangles, middle = self._triangles[element], self._middle[element, axis]
+        heights = np.unique(triangles[:, :, axis])
+        below, above = places[planes[places] > heights[0]], places[planes[places] < heights[-1]]
+        uppers = np.searchsorted(heights, planes[below]), np.searchsorted(heights, planes[above], "right")
+        for upper in np.unique(np.concatenate(uppers)).tolist():
+            over = triangles[:, :, axis] >= heights[upper]
+            cut = triangles[over.any(axis=1) & ~over.all(axis=1)]
+            if len(cut) > SECTION_TRIANGLES:
+                continue
+            sides = below[uppers[0] == upper], above[uppers[1] == upper]
+            if (_normals(cut)[:, axis] == 0).all():
+                served = np.concatenate(sides)
+                first = int(served.min())
+                yield Cut(cut, axis, int(planes[first]), first in sides[0]), served
+                continue
+            for mine, under in zip(sides, (True, False), strict=True):
+                at = mine[planes[mine] == middle]
+                if len(at):
+                    yield Cut(cut, axis, int(middle), under), at
 
 
 def _stands_oblique(triangles: np.ndarray) -> bool:
