@@ -20,6 +20,7 @@ from .opaque import plane_rectangles
 from .progress import track
 from .regions import section_rectangles
 from .scene import turned
+from .shapes import shape_key
 from .solids import winding_numbers
 
 # `Blockers.axis` of a curtain from the corner of its plan box with the least x and y to the opposite one, and of one
@@ -55,16 +56,27 @@ def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float) 
     """
     least = LEAST_M2 / grid_m**2
     boxes, kinds = [np.zeros((0, 2, 3), np.int64)], [np.zeros(0, np.int64)]
+    # Opaque is what no triangle of its element comes near: of elements that are alike, one tells.
+    known: dict[bytes, tuple[np.ndarray, list[np.ndarray]]] = {}
     for triangles in track(elements, "curtains", "element"):
-        quads = _sections(triangles, least, THIN_M / grid_m)
-        if not len(quads):
-            continue
-        quads = quads[inside(quads, triangles)]
-        for part in [*_pieces(quads, PIECE_M / grid_m), *_tips(quads, triangles)]:
-            _add(boxes, kinds, part)
+        key, corner = shape_key(triangles), triangles.min(axis=(0, 1))
+        if key not in known:
+            known[key] = corner, _of_element(triangles, least, grid_m)
+        first, parts = known[key]
+        for part in parts:
+            _add(boxes, kinds, part + (corner - first))
     _add(boxes, kinds, _upright_faces(faces, least))
     joined = np.concatenate(boxes).astype(np.int32)
     return Blockers(joined, np.concatenate(kinds).astype(np.int32))
+
+
+def _of_element(triangles: np.ndarray, least: float, grid_m: float) -> list[np.ndarray]:
+    """Curtains inside one closed element, in lots: (A, B) x (x, y, z), shape (n, 2, 3), int64."""
+    quads = _sections(triangles, least, THIN_M / grid_m)
+    if not len(quads):
+        return []
+    quads = quads[inside(quads, triangles)]
+    return [*_pieces(quads, PIECE_M / grid_m), *_tips(quads, triangles)]
 
 
 def _add(boxes: list[np.ndarray], kinds: list[np.ndarray], quads: np.ndarray) -> None:

@@ -6,7 +6,6 @@ around them are conservative.
 """
 
 from dataclasses import dataclass
-from hashlib import sha256
 from itertools import product
 
 import numpy as np
@@ -18,6 +17,7 @@ from .incidence import CHUNK, clip_bounds
 from .plans import NO_PLANS, Plans, are_convex, box_corners, turned_plan
 from .ragged import owners_of, places_of
 from .scene import Scene, bounds_by_owner, turned
+from .shapes import first_alike
 
 # Pieces are no smaller than this, and at most PIECES along an axis of their object.
 PIECE_M = 1.0
@@ -108,7 +108,7 @@ def _occludees(bounds: np.ndarray, pieces: np.ndarray, plans: Plans, owner: np.n
 def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, Plans, np.ndarray]:
     """Pieces of all objects in object order, their plans, and the object of each."""
     triangles, owners = scene.triangles()
-    models = _models(triangles, owners, bounds)
+    models = first_alike(triangles, scene.triangle_starts)
     cut = models[owners] == owners
     triangles, owners = triangles[cut], owners[cut]
     yaw = _yaws(triangles, owners, len(bounds))
@@ -255,17 +255,6 @@ def _plan_points(triangles: np.ndarray, rectangle: np.ndarray, yaw_deg: float) -
     turn = edges[:, :, 0] * rest[..., 1] - edges[:, :, 1] * rest[..., 0]
     crossings.append(corners[((turn >= 0).all(axis=2) | (turn <= 0).all(axis=2)).any(axis=1)])
     return np.concatenate([own[inside], turned_plan(np.concatenate(crossings), yaw_deg)])
-
-
-def _models(triangles: np.ndarray, owners: np.ndarray, bounds: np.ndarray) -> np.ndarray:
-    """The first object whose snapped triangles differ from an object's by a shift only, shape (objects,), int64."""
-    starts = np.searchsorted(owners, np.arange(len(bounds) + 1))
-    known: dict[bytes, int] = {}
-    models = np.arange(len(bounds))
-    for number in np.flatnonzero(np.diff(starts)):
-        relative = triangles[starts[number] : starts[number + 1]] - bounds[number, 0].astype(np.int32)
-        models[number] = known.setdefault(sha256(relative.tobytes()).digest(), int(number))
-    return models
 
 
 def _cut(triangles: np.ndarray, owners: np.ndarray, bounds: np.ndarray, least: int) -> tuple[np.ndarray, np.ndarray]:
