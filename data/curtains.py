@@ -18,6 +18,7 @@ import numpy as np
 from .blockers import Blockers, maximal_rectangles, paint
 from .opaque import plane_rectangles
 from .progress import track
+from .ragged import starts_of
 from .regions import section_rectangles
 from .scene import turned
 from .shapes import shape_key
@@ -381,21 +382,49 @@ def _upright_faces(triangles: np.ndarray, least: float) -> np.ndarray:
     extent = np.ptp(t, axis=1)
     two &= (extent[:, :2] > 0).all(axis=1) & (np.hypot(extent[:, 0], extent[:, 1]) * extent[:, 2] >= least / 4)
     t, key, order = t[two], key[two], order[two]
-    ends = order[:, [0, 2]]
-    _, group = np.unique(ends, axis=0, return_inverse=True)
-    group = group.ravel()
+    ends, group, count = np.unique(order[:, [0, 2]], axis=0, return_inverse=True, return_counts=True)
+    group, starts = group.ravel(), starts_of(count)
     rows = np.argsort(group, kind="stable")
-    found = [np.zeros((0, 2, 3), np.int64)]
-    for part in np.split(rows, np.flatnonzero(np.diff(group[rows])) + 1) if len(rows) else []:
-        # Over the first point 0, over the second one 1.
-        side = (key[part] != ends[part[0], 0]).astype(np.int64)
-        first, second = (t[part][key[part] == end][0, :2] for end in ends[part[0]])
-        flat, _, _ = plane_rectangles(np.stack([side, t[part, :, 2]], axis=2).astype(np.int32), 1)
-        flat = flat[(flat[:, 0, 0] == 0) & (flat[:, 1, 0] == 1)].astype(np.int64)
-        size = (flat[:, 1, 1] - flat[:, 0, 1]) * np.hypot(*(second - first))
-        flat = flat[size >= least]
-        quad = np.empty((len(flat), 2, 3), np.int64)
-        quad[:, 0, :2], quad[:, 1, :2] = first, second
-        quad[:, :, 2] = flat[:, :, 1]
-        found.append(quad)
-    return np.concatenate(found)
+    y = (ends + (1 << 31)) % (1 << 32) - (1 << 31)
+    points = np.stack([(ends - y) >> 32, y], axis=2)
+    # Over the first point 0, over the second one 1.
+    flat = np.stack([key != ends[group][:, :1], t[:, :, 2]], axis=2)
+    pairs = np.flatnonzero(count == 2)
+    whole = fill_rectangle(flat[rows[starts[pairs][:, None] + [0, 1]]])
+    of, heights = [pairs[whole]], [flat[rows[starts[pairs[whole]]]][:, :, 1]]
+    heights[0] = np.stack([heights[0].min(axis=1), heights[0].max(axis=1)], axis=1)
+    # A triangle alone fills none.
+    several = count > 1
+    several[pairs[whole]] = False
+    for number in np.flatnonzero(several).tolist():
+        found, _, _ = plane_rectangles(flat[rows[starts[number] : starts[number + 1]]].astype(np.int32), 1)
+        found = found[(found[:, 0, 0] == 0) & (found[:, 1, 0] == 1)].astype(np.int64)
+        of.append(np.full(len(found), number))
+        heights.append(found[:, :, 1])
+    of, heights = np.concatenate(of), np.concatenate(heights)
+    large = np.hypot(*(points[of, 1] - points[of, 0]).T) * (heights[:, 1] - heights[:, 0]) >= least
+    of, heights = of[large], heights[large]
+    quads = np.concatenate([points[of], heights[:, :, None]], axis=2)
+    return quads[np.argsort(of, kind="stable")]
+
+
+def fill_rectangle(pairs: np.ndarray) -> np.ndarray:
+    """Pairs of triangles (u, v) with u of 0 or 1 that are the halves of a rectangle, as most faces are; (n,), bool.
+
+    Args:
+        pairs: shape (n, 2, 3, 2), int; no triangle is a segment.
+    """
+    right = pairs[..., 0].sum(axis=2)
+    # One has two corners at 0, the other two at 1, and each of them the rectangle's height there.
+    halves = (right == 1) | (right == 2)
+    halves = halves.all(axis=1) & (right.sum(axis=1) == 3)
+    low, high = pairs[..., 1].min(axis=2), pairs[..., 1].max(axis=2)
+    halves &= (low[:, 0] == low[:, 1]) & (high[:, 0] == high[:, 1])
+    lone = (pairs[..., 0] == 1) == (right == 1)[:, :, None]
+    apex = np.where(lone, pairs[..., 1], 0).sum(axis=2)
+    base = np.where(lone, low[:, :, None], pairs[..., 1])
+    halves &= (base.max(axis=2) == high).all(axis=1)
+    base = np.where(lone, high[:, :, None], pairs[..., 1])
+    halves &= (base.min(axis=2) == low).all(axis=1)
+    # The diagonal is one and the same.
+    return halves & (apex.sum(axis=1) == low[:, 0] + high[:, 0]) & (apex[:, 0] != apex[:, 1])

@@ -17,7 +17,6 @@ from .incidence import CHUNK, clip_bounds
 from .plans import NO_PLANS, Plans, are_convex, box_corners, turned_plan
 from .ragged import owners_of, places_of
 from .scene import Scene, bounds_by_owner, turned
-from .shapes import first_alike
 
 # Pieces are no smaller than this, and at most PIECES along an axis of their object.
 PIECE_M = 1.0
@@ -108,7 +107,7 @@ def _occludees(bounds: np.ndarray, pieces: np.ndarray, plans: Plans, owner: np.n
 def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, Plans, np.ndarray]:
     """Pieces of all objects in object order, their plans, and the object of each."""
     triangles, owners = scene.triangles()
-    models = first_alike(triangles, scene.triangle_starts)
+    models = scene.first_alike
     cut = models[owners] == owners
     triangles, owners = triangles[cut], owners[cut]
     yaw = _yaws(triangles, owners, len(bounds))

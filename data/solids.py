@@ -17,11 +17,14 @@ def closed_elements(scene: Scene, *roles: Role) -> list[tuple[int, np.ndarray]]:
         (object_id, triangles (m, 3, 3) int32) of each.
     """
     triangles, _ = scene.triangles()
-    starts, found = scene.triangle_starts, []
-    for object_id in np.flatnonzero(scene.object_mask(*(roles or OPAQUE))):
-        part = triangles[starts[object_id] : starts[object_id + 1]]
-        if len(part) >= 4 and is_closed(part):
-            found.append((int(object_id), part))
+    starts, models, found = scene.triangle_starts, scene.first_alike.tolist(), []
+    closed: dict[int, bool] = {}
+    for object_id in np.flatnonzero(scene.object_mask(*(roles or OPAQUE))).tolist():
+        part, model = triangles[starts[object_id] : starts[object_id + 1]], models[object_id]
+        if model not in closed:
+            closed[model] = len(part) >= 4 and is_closed(part)
+        if closed[model]:
+            found.append((object_id, part))
     return found
 
 

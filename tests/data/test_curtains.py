@@ -1,11 +1,14 @@
 """Curtains of a model: each is opaque by the checker that shares nothing with what found it."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 import trimesh
 from builders import random_solids
 from viewcell.data import curtains
-from viewcell.data.curtains import FALLING, clearly_missed, crossed, find_curtains, meeting
+from viewcell.data.curtains import FALLING, clearly_missed, crossed, fill_rectangle, find_curtains, meeting
+from viewcell.data.opaque import plane_rectangles
 from viewcell.data.prepared import PreparedModel
 from viewcell.data.scene import GRID_M
 from viewcell.verify.proofs.curtain import is_opaque
@@ -127,6 +130,22 @@ def test_walls_that_are_alike_have_the_same_curtains_each_where_it_stands(monkey
     each = found.boxes[:inside].reshape(3, -1, 2, 3)
     for mine, place in zip(each, places, strict=True):
         assert (mine - each[0] == np.round(np.array(place) / GRID_M)).all()
+
+
+def test_two_triangles_fill_a_rectangle_if_rasters_say_so():
+    """All pairs of triangles on two uprights of three points each."""
+    points = [(u, v) for u in (0, 1) for v in (3, 5, 9)]
+    triangles = [t for t in permutations(points, 3) if len({u for u, _ in t}) == 2]
+    pairs = np.array([(a, b) for a in triangles for b in triangles if sorted(a) == list(a)])
+    filled = 0
+    for pair, said in zip(pairs, fill_rectangle(pairs).tolist(), strict=True):
+        found, _, _ = plane_rectangles(pair.astype(np.int32), 1)
+        # Of triangles that reach over both heights: others leave a part of a rectangle, or make one of two.
+        alike = (np.ptp(pair[:, :, 1], axis=1) == np.ptp(pair[:, :, 1])).all()
+        whole = found.tolist() == [[[0, pair[:, :, 1].min()], [1, pair[:, :, 1].max()]]]
+        assert said == (alike and whole), pair.tolist()
+        filled += said
+    assert filled > 20
 
 
 def test_models_along_the_axes_and_small_ones_have_none():
