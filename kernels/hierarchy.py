@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ..data.ragged import starts_of
 from .launch import CPU, Scratch, launch_slots
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -32,6 +33,8 @@ WORK_SIZE = wp.constant(AT_COST + 16)
 # Integers per node that waits while the smaller half of another is cut up, one per halving: node, first, last.
 WAITING = wp.constant(3)
 STACK_SIZE = wp.constant(3 * 64)
+# A tree takes as long again as so many boxes, however few it holds.
+LAUNCHED = 64
 
 
 @dataclass
@@ -312,3 +315,43 @@ def build_hierarchy(boxes: np.ndarray) -> Hierarchy:
     nodes = CPU.zeros(2 * count - 1, Node)
     launch_slots(_build, 1, [lo, hi], Scratch(int(WORK_SIZE), count + int(STACK_SIZE)), [nodes], CPU)
     return Hierarchy(nodes.numpy())
+
+
+def build_of_copies(boxes: np.ndarray, starts: np.ndarray, models: np.ndarray) -> Hierarchy:
+    """Hierarchy over groups of boxes, some of which are others shifted: as `build_hierarchy`, of many soon made.
+
+    Where it pays, each group has a tree of its own under one of all groups, and those that are alike are cut up once.
+
+    Args:
+        boxes: as of `build_hierarchy`.
+        starts: boxes of group g are starts[g]:starts[g + 1], shape (groups + 1,), int.
+        models: of each group the first one that is the same but for a shift, shape (groups,), int.
+    """
+    groups = np.flatnonzero(np.diff(starts))
+    once = np.unique(models[groups])
+    if 2 * (np.diff(starts)[once].sum() + LAUNCHED * len(once)) >= len(boxes):
+        return build_hierarchy(boxes)
+    around = [least.reduceat(boxes[:, side], starts[groups]) for side, least in ((0, np.minimum), (1, np.maximum))]
+    top = build_hierarchy(np.stack(around, axis=1)).nodes
+    leaf = np.flatnonzero(top[:, 7] >= 0)
+    group = groups[top[leaf, 7]]
+    sizes = np.ones(len(top), np.int64)
+    sizes[leaf] = 2 * np.diff(starts)[group] - 1
+    # In place of a leaf of the upper tree stands the tree of its group.
+    places = starts_of(sizes)
+    nodes = np.empty((places[-1], 8), np.int32)
+    top[:, 3] = places[top[:, 3]]
+    nodes[places[:-1]] = top
+    low = boxes[starts[group], 0].astype(np.int64)
+    order = np.argsort(models[group], kind="stable")
+    ends = np.flatnonzero(np.append(np.diff(models[group][order]) > 0, True)) + 1
+    for begin, end in zip(np.append(0, ends[:-1]), ends, strict=True):
+        some = order[begin:end]
+        first = starts[models[group[some[0]]]]
+        own = build_hierarchy(boxes[first : first + (sizes[leaf[some[0]]] + 1) // 2]).nodes
+        shift = low[some] - boxes[first, 0]
+        moved = np.column_stack([shift, places[leaf[some]], shift, starts[group[some]]]).astype(np.int32)
+        made = own[None] + moved[:, None]
+        made[:, own[:, 7] < 0, 7] = -1
+        nodes[places[leaf[some]][:, None] + np.arange(len(own))] = made
+    return Hierarchy(nodes)
