@@ -3,13 +3,12 @@
 Run `python -m viewcell.workbench.bench scaling --scene plant --triangles 100000 1000000 --cells 1000 --budget 300
 --threads 1 --out FOLDER`. View cells are boxes of 1 m to 2 m drawn at random in the scene's spaces. Each size runs in a
 process of its own, so that its peak memory is its own. The table goes to standard output, and with the picture into
-FOLDER; below it the exponents of growth.
+FOLDER, where the bakes stay, for `viewcell verify`; below it the exponents of growth.
 """
 
 import argparse
 import multiprocessing
 import resource
-import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -122,20 +121,22 @@ def cells_in_spaces(scene: Scene, count: int, seed: int = 0) -> np.ndarray:
     return np.stack([low, low + extent], axis=1)
 
 
-def measure(name: str, triangles: int, cells: int, budget_s: float, device: str, threads: int | None) -> Measured:
-    """Make a scene and bake it; call it in a fresh process."""
+def measure(
+    name: str, triangles: int, cells: int, budget_s: float, device: str, threads: int | None, folder: Path
+) -> Measured:
+    """Make a scene and bake it into a folder; call it in a fresh process."""
     started = time.perf_counter()
     scene = SCENES[name](triangles=triangles)
     made_s = time.perf_counter() - started
-    with tempfile.TemporaryDirectory() as scratch:
-        table = Path(scratch) / "cells.csv"
-        boxes = cells_in_spaces(scene, cells).reshape(-1, 6).T
-        pyarrow.csv.write_csv(pa.table(dict(zip(CELL_COLUMNS[1:], boxes, strict=True))), table)
-        settings = Settings(method="occluders", cells=str(table))
-        run = {"budget_s": budget_s, "threads": threads, "device": device}
-        made = bake(scene, Path(scratch) / "x.bake", settings=settings, **run)
-        source = made.cell_to_object["cell_id"].to_numpy()
-        seen = np.array(made.cell_to_object["verdict"].to_pylist(), object) == "visible"
+    at = folder / f"{name}-{triangles}"
+    at.mkdir(parents=True, exist_ok=True)
+    boxes = cells_in_spaces(scene, cells).reshape(-1, 6).T
+    pyarrow.csv.write_csv(pa.table(dict(zip(CELL_COLUMNS[1:], boxes, strict=True))), at / "cells.csv")
+    settings = Settings(method="occluders", cells=str(at / "cells.csv"))
+    run = {"budget_s": budget_s, "device": device, "threads": threads, "overwrite": True}
+    made = bake(scene, at / "scene.bake", settings=settings, **run)
+    source = made.cell_to_object["cell_id"].to_numpy()
+    seen = np.array(made.cell_to_object["verdict"].to_pylist(), object) == "visible"
     sizes = np.bincount(source, minlength=cells)
     # A cell that the budget did not reach keeps every object.
     bounded = sizes < len(scene.objects)
@@ -215,7 +216,7 @@ def run(options: argparse.Namespace) -> int:
     print(*lines, sep="\n", flush=True)
     rows = []
     for name, triangles in product(options.scene, options.triangles):
-        case = (name, triangles, options.cells, options.budget, options.device, options.threads)
+        case = (name, triangles, options.cells, options.budget, options.device, options.threads, options.out)
         with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
             rows.append(pool.submit(measure, *case).result())
         lines.append("| " + " | ".join(rows[-1].columns()) + " |")
