@@ -13,6 +13,7 @@ import numpy as np
 import warp as wp
 
 from ..data.ragged import starts_of
+from ..data.shapes import copies, mostly_copies
 from .launch import CPU, Scratch, launch_slots
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -33,8 +34,6 @@ WORK_SIZE = wp.constant(AT_COST + 16)
 # Integers per node that waits while the smaller half of another is cut up, one per halving: node, first, last.
 WAITING = wp.constant(3)
 STACK_SIZE = wp.constant(3 * 64)
-# A tree takes as long again as so many boxes, however few it holds.
-LAUNCHED = 64
 
 
 @dataclass
@@ -327,10 +326,9 @@ def build_of_copies(boxes: np.ndarray, starts: np.ndarray, models: np.ndarray) -
         starts: boxes of group g are starts[g]:starts[g + 1], shape (groups + 1,), int.
         models: of each group the first one that is the same but for a shift, shape (groups,), int.
     """
-    groups = np.flatnonzero(np.diff(starts))
-    once = np.unique(models[groups])
-    if 2 * (np.diff(starts)[once].sum() + LAUNCHED * len(once)) >= len(boxes):
+    if not mostly_copies(starts, models):
         return build_hierarchy(boxes)
+    groups = np.flatnonzero(np.diff(starts))
     around = [least.reduceat(boxes[:, side], starts[groups]) for side, least in ((0, np.minimum), (1, np.maximum))]
     top = build_hierarchy(np.stack(around, axis=1)).nodes
     leaf = np.flatnonzero(top[:, 7] >= 0)
@@ -342,16 +340,13 @@ def build_of_copies(boxes: np.ndarray, starts: np.ndarray, models: np.ndarray) -
     nodes = np.empty((places[-1], 8), np.int32)
     top[:, 3] = places[top[:, 3]]
     nodes[places[:-1]] = top
-    low = boxes[starts[group], 0].astype(np.int64)
-    order = np.argsort(models[group], kind="stable")
-    ends = np.flatnonzero(np.append(np.diff(models[group][order]) > 0, True)) + 1
-    for begin, end in zip(np.append(0, ends[:-1]), ends, strict=True):
-        some = order[begin:end]
-        first = starts[models[group[some[0]]]]
-        own = build_hierarchy(boxes[first : first + (sizes[leaf[some[0]]] + 1) // 2]).nodes
-        shift = low[some] - boxes[first, 0]
-        moved = np.column_stack([shift, places[leaf[some]], shift, starts[group[some]]]).astype(np.int32)
+    begins = np.empty(len(models), np.int64)
+    begins[group] = places[leaf]
+    for model, members in copies(starts, models):
+        own = build_hierarchy(boxes[starts[model] : starts[model + 1]]).nodes
+        shift = boxes[starts[members], 0] - boxes[starts[model], 0]
+        moved = np.column_stack([shift, begins[members], shift, starts[members]]).astype(np.int32)
         made = own[None] + moved[:, None]
         made[:, own[:, 7] < 0, 7] = -1
-        nodes[places[leaf[some]][:, None] + np.arange(len(own))] = made
+        nodes[begins[members][:, None] + np.arange(len(own))] = made
     return Hierarchy(nodes)

@@ -36,7 +36,7 @@ def test_finds_what_a_loop_finds(count):
         assert sorted(items_met(tree, query)[0]) == truth.tolist()
 
 
-def copies(rng, shapes, times):
+def some_copies(rng, shapes, times):
     """Boxes of groups, some empty, most of them others shifted; where each begins, and its model."""
     groups, models = [], []
     for count in shapes:
@@ -52,13 +52,13 @@ def copies(rng, shapes, times):
     return np.concatenate([groups[k] for k in order]).astype(np.int32), starts, firsts
 
 
-@pytest.mark.parametrize("launched", [0, 10**9])
+@pytest.mark.parametrize("apart", [True, False])
 @pytest.mark.parametrize("shapes", [(1,), (5,), (1, 2, 40), (300, 7)])
-def test_copies_find_what_a_loop_finds(monkeypatch, shapes, launched):
+def test_copies_find_what_a_loop_finds(monkeypatch, shapes, apart):
     """Whether groups have trees of their own or not."""
-    monkeypatch.setattr(hierarchy, "LAUNCHED", launched)
+    monkeypatch.setattr(hierarchy, "mostly_copies", lambda *_: apart)
     rng = np.random.default_rng(len(shapes))
-    boxes, starts, models = copies(rng, shapes, 6)
+    boxes, starts, models = some_copies(rng, shapes, 6)
     tree = build_of_copies(boxes, starts, models)
     leaves = tree.links[:, 1] >= 0
     assert len(tree.links) == 2 * len(boxes) - 1
