@@ -417,7 +417,7 @@ def copied_patches(patches: Patches, models: np.ndarray, corners: np.ndarray) ->
     along = (shift * normal).sum(axis=1)
     size = np.abs(shift).sum(axis=1) + np.abs(patches.depth[of]).max(axis=1)
     inexact = (np.count_nonzero(normal, axis=1) > 1) & shift.any(axis=1)
-    slack = 4 * np.finfo(np.float64).eps * size * inexact
+    slack = size * inexact * (4 * np.finfo(np.float64).eps)
     return Patches(
         patches.corners[places] + np.repeat(shift, np.diff(starts), axis=0).astype(np.int32),
         starts,
