@@ -22,6 +22,7 @@ from .progress import track
 from .ragged import places_of, starts_of
 from .scene import turned
 from .sections import largest_sections, over
+from .shapes import shape_key
 from .solids import winds_around
 
 # `Blockers.axis` of a curtain from the corner of its plan box with the least x and y to the opposite one, and of one
@@ -58,15 +59,41 @@ def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float) 
     """
     least = LEAST_M2 / grid_m**2
     boxes, kinds = [np.zeros((0, 2, 3), np.int64)], [np.zeros(0, np.int64)]
-    for lot in track(lots_of(elements), "curtains", "lot"):
+    # Opaque is what no triangle of its element comes near: of elements that are alike, one tells.
+    firsts, shifts = _alike(elements)
+    for lot in track(lots_of(firsts), "curtains", "lot"):
+        mine, shifts = shifts[: len(lot)], shifts[len(lot) :]
         owner, quads = _sections(lot, least, THIN_M / grid_m)
         held = inside(quads, owner, lot)
         owner, quads = owner[held], quads[held]
-        for part in [*_pieces(quads, PIECE_M / grid_m), *_tips(quads, owner, lot)]:
-            _add(boxes, kinds, part)
+        pieces = [(owner[row], part) for row, part in _pieces(quads, PIECE_M / grid_m)]
+        for of, part in [*pieces, *_tips(quads, owner, lot)]:
+            _add(boxes, kinds, _copied(part, of, mine))
     _add(boxes, kinds, _upright_faces(faces, least))
     joined = np.concatenate(boxes).astype(np.int32)
     return Blockers(joined, np.concatenate(kinds).astype(np.int32))
+
+
+def _alike(elements: list[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """The first element of each shape, and how far it is to each of that shape, (n, 3), itself first."""
+    known: dict[bytes, int] = {}
+    firsts: list[np.ndarray] = []
+    corners: list[list[np.ndarray]] = []
+    for triangles in elements:
+        number = known.setdefault(shape_key(triangles), len(firsts))
+        if number == len(firsts):
+            firsts.append(triangles)
+            corners.append([])
+        corners[number].append(triangles.min(axis=(0, 1)))
+    return firsts, [np.array(own) - own[0] for own in corners]
+
+
+def _copied(quads: np.ndarray, owner: np.ndarray, shifts: list[np.ndarray]) -> np.ndarray:
+    """Rectangles of the first element of each shape, in all elements of that shape."""
+    starts = starts_of([len(own) for own in shifts])
+    sizes = np.diff(starts)[owner]
+    every = np.concatenate([np.zeros((0, 3), np.int64), *shifts])
+    return np.repeat(quads, sizes, axis=0) + every[places_of(starts[:-1][owner], sizes)][:, None]
 
 
 def lots_of(elements: list[np.ndarray]) -> list[list[np.ndarray]]:
@@ -160,13 +187,14 @@ def cuts_inside(depths: np.ndarray, low: int, high: int, thin: float, recess: in
     return sorted(cuts)
 
 
-def _pieces(quads: np.ndarray, least: float) -> list[np.ndarray]:
-    """Curtains with their halves and the halves of those, down to a length, in lots."""
+def _pieces(quads: np.ndarray, least: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Curtains with their halves and the halves of those, down to a length, in lots: curtain of each, and pieces."""
     found = []
     length = np.hypot(*(quads[:, 1, :2] - quads[:, 0, :2]).T)
     times = np.maximum(0, np.floor(np.log2(np.maximum(length, 1.0) / least))).astype(int)
     for most in np.unique(times):
-        mine = quads[times == most]
+        rows = np.flatnonzero(times == most)
+        mine = quads[rows]
         for level in range(most + 1):
             parts = 2**level
             share = np.arange(parts + 1)[:, None] / parts
@@ -175,7 +203,7 @@ def _pieces(quads: np.ndarray, least: float) -> list[np.ndarray]:
             piece = np.empty((len(mine), parts, 2, 3), np.int64)
             piece[:, :, 0, :2], piece[:, :, 1, :2] = points[:, :-1], points[:, 1:]
             piece[:, :, :, 2] = mine[:, None, :, 2]
-            found.append(piece.reshape(-1, 2, 3))
+            found.append((np.repeat(rows, parts), piece.reshape(-1, 2, 3)))
     return found
 
 
@@ -215,8 +243,8 @@ def _pairs(
         yield slice(first, stop), row, every[places_of(starts[mine], sizes[mine])]
 
 
-def _tips(quads: np.ndarray, owner: np.ndarray, elements: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Rectangles from the ends of sections to upright edges of their element nearby: (A, B) x (x, y, z), (n, 2, 3).
+def _tips(quads: np.ndarray, owner: np.ndarray, elements: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Rectangles from the ends of sections to upright edges of their element nearby: element, and (A, B) x (x, y, z).
 
     A section ends some steps short of the end of a wall. What it leaves open to the corner, where the next wall begins,
     they close: those from the near end. Those from the far end hide what stands behind the corner from eyes that look
@@ -231,10 +259,10 @@ def _tips(quads: np.ndarray, owner: np.ndarray, elements: list[np.ndarray]) -> t
             found[kind].append(part)
             owners[kind].append(np.full(len(part), number))
     none = np.zeros((0, 2, 3), np.int64)
-    return tuple(
+    return [
         _opaque(np.concatenate([none, *parts]), np.concatenate([none[:, 0, 0], *of]), elements)
         for parts, of in zip(found, owners, strict=True)
-    )
+    ]
 
 
 def _to_corners(quads: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
@@ -260,8 +288,8 @@ def _to_corners(quads: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
     return found
 
 
-def _opaque(quads: np.ndarray, owner: np.ndarray, elements: list[np.ndarray]) -> np.ndarray:
-    """Those of some rectangles that lie inside the closed surfaces that own them, borders aside; exactly."""
+def _opaque(quads: np.ndarray, owner: np.ndarray, elements: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Those of some rectangles that lie inside the surfaces that own them, borders aside, and their owners; exactly."""
     clear = np.zeros(len(quads), bool)
     for rows, row, triangles in _pairs(quads, owner, elements):
         held = winds_around(quads[rows].mean(axis=1), row, triangles)
@@ -272,7 +300,7 @@ def _opaque(quads: np.ndarray, owner: np.ndarray, elements: list[np.ndarray]) ->
             if held[row[which]] and crossed(quads[rows][row[which]], triangles[which]):
                 held[row[which]] = False
         clear[rows] = held
-    return quads[clear]
+    return owner[clear], quads[clear]
 
 
 def clearly_missed(quads: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -6,7 +6,6 @@ around them are conservative.
 """
 
 from dataclasses import dataclass
-from hashlib import sha256
 from itertools import pairwise, product
 
 import numpy as np
@@ -108,7 +107,7 @@ def _occludees(bounds: np.ndarray, pieces: np.ndarray, plans: Plans, owner: np.n
 def _pieces(scene: Scene, bounds: np.ndarray) -> tuple[np.ndarray, Plans, np.ndarray]:
     """Pieces of all objects in object order, their plans, and the object of each."""
     triangles, owners = scene.triangles()
-    models = _models(triangles, owners, bounds)
+    models = scene.first_alike
     cut = models[owners] == owners
     triangles, owners = triangles[cut], owners[cut]
     yaw = _yaws(triangles, owners, len(bounds))
@@ -274,17 +273,6 @@ def _plan_points(triangles: np.ndarray, rectangles: np.ndarray, yaw_deg: float) 
     owners.append(np.nonzero(over)[0])
     found.append(turned_plan(np.concatenate(crossings), yaw_deg))
     return row[np.concatenate(rows + owners)], np.concatenate(found)
-
-
-def _models(triangles: np.ndarray, owners: np.ndarray, bounds: np.ndarray) -> np.ndarray:
-    """The first object whose snapped triangles differ from an object's by a shift only, shape (objects,), int64."""
-    starts = np.searchsorted(owners, np.arange(len(bounds) + 1))
-    known: dict[bytes, int] = {}
-    models = np.arange(len(bounds))
-    for number in np.flatnonzero(np.diff(starts)):
-        relative = triangles[starts[number] : starts[number + 1]] - bounds[number, 0].astype(np.int32)
-        models[number] = known.setdefault(sha256(relative.tobytes()).digest(), int(number))
-    return models
 
 
 def _cut(triangles: np.ndarray, owners: np.ndarray, bounds: np.ndarray, least: int) -> tuple[np.ndarray, np.ndarray]:

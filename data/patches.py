@@ -26,7 +26,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from .errors import InputError
-from .ragged import starts_of
+from .ragged import places_of, starts_of, take_lists
 
 # Coordinates are below this [grid steps].
 LIMIT = 2**24
@@ -396,6 +396,38 @@ class _Mesh:
                 out.append(b)
             a = b
         return out
+
+
+def copied_patches(patches: Patches, models: np.ndarray, corners: np.ndarray) -> Patches:
+    """Patches of some objects, and of those that are alike: each after the patch that it is a copy of.
+
+    Args:
+        patches: of objects that are their own model.
+        models: of each object the one whose triangles are its own but for a shift, -1 for none; shape (objects,), int.
+        corners: low corner of each object's box [grid steps], shape (objects, 3), int.
+    """
+    order = np.argsort(models, kind="stable")
+    first, last = (np.searchsorted(models[order], patches.owner, side=side) for side in ("left", "right"))
+    of = np.repeat(np.arange(len(patches.owner)), last - first)
+    owner = order[places_of(first, last - first)]
+    shift = corners[owner] - corners[patches.owner[of]]
+    starts, places = take_lists(patches.starts, of)
+    normal = patches.normal[of]
+    # As in `_collect`: three products and their sums, each rounded once, unless nothing is.
+    along = (shift * normal).sum(axis=1)
+    size = np.abs(shift).sum(axis=1) + np.abs(patches.depth[of]).max(axis=1)
+    inexact = (np.count_nonzero(normal, axis=1) > 1) & shift.any(axis=1)
+    slack = size * inexact * (4 * np.finfo(np.float64).eps)
+    return Patches(
+        patches.corners[places] + np.repeat(shift, np.diff(starts), axis=0).astype(np.int32),
+        starts,
+        patches.boxes[of] + shift[:, None].astype(np.int32),
+        normal,
+        patches.depth[of] + along[:, None] + np.column_stack([-slack, slack]),
+        owner.astype(np.int32),
+        patches.area[of],
+        [patches.members[number] for number in of.tolist()],
+    )
 
 
 def rectangle_outlines(boxes: np.ndarray) -> Patches:

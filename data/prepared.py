@@ -15,7 +15,7 @@ from .exposed import exposed_faces
 from .graph import CellGraph
 from .occludees import Occludees, find_occludees
 from .opaque import OpaquePlanes, carved_planes, opaque_planes
-from .patches import Patches, find_patches, join_outlines, rectangle_outlines
+from .patches import Patches, copied_patches, find_patches, join_outlines, rectangle_outlines
 from .regions import Regions, find_regions
 from .room_cells import find_room_points
 from .scene import OPAQUE, Role, Scene
@@ -59,7 +59,9 @@ class PreparedModel:
     def large_closed(self) -> list[np.ndarray]:
         """Triangles of closed elements that are large enough to be cut at an angle."""
         least = CURTAIN_M2 / self.scene.grid_m**2
-        return [t for _, t in self.closed if _flat_area(np.ptp(t, axis=(0, 1))[None])[0] >= least]
+        bounds = self.scene.object_bounds()
+        large = _flat_area(bounds[:, 1] - bounds[:, 0]) >= least
+        return [triangles for object_id, triangles in self.closed if large[object_id]]
 
     def closed_of(self, role: Role) -> list[tuple[int, np.ndarray]]:
         """Those of one role."""
@@ -108,17 +110,23 @@ class PreparedModel:
     @cached_property
     def patches(self) -> Patches:
         """Oblique occluders: discs of opaque triangles."""
-        corners, owners = self.scene.triangles(*OPAQUE)
-        least = PATCH_M2 / self.scene.grid_m**2
+        corners, owners = self.scene.triangles()
+        models, bounds = self.scene.first_alike, self.scene.object_bounds()
+        least, opaque = PATCH_M2 / self.scene.grid_m**2, self.scene.object_mask(*OPAQUE)
+        # The first opaque one of those that are alike; the others' patches are shifted.
+        first = np.full(len(models), -1)
+        first[models[opaque][::-1]] = np.flatnonzero(opaque)[::-1]
+        models = np.where(opaque, first[models], -1)
         # The extent bounds the area, and most triangles of a large model are small ones of furniture and pipes.
-        large = np.flatnonzero(_flat_area(np.ptp(corners, axis=1)) >= PATCH_SHARE * least)
+        large = np.flatnonzero((models == np.arange(len(models)))[owners])
+        large = large[_flat_area(np.ptp(corners[large], axis=1)) >= PATCH_SHARE * least]
         edges = (corners[large, 1:] - corners[large, :1]).astype(float)
         large = large[np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) >= 2 * PATCH_SHARE * least]
         found = find_patches(corners[large], owners[large], least_area=least)
         # Members are places among the large triangles of their owner; certificates want them among all of its.
-        ahead, first = np.searchsorted(owners[large], found.owner), np.searchsorted(owners, found.owner)
-        found.members = [large[a + held] - f for a, f, held in zip(ahead, first, found.members, strict=True)]
-        return found
+        ahead, begin = np.searchsorted(owners[large], found.owner), self.scene.triangle_starts[found.owner]
+        found.members = [large[a + held] - f for a, f, held in zip(ahead, begin, found.members, strict=True)]
+        return copied_patches(found, models, bounds[:, 0])
 
     @cached_property
     def curtains(self) -> Blockers:

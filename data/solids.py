@@ -11,8 +11,8 @@ from .ragged import places_of, starts_of
 from .scene import GRID_LIMIT, OPAQUE, Role, Scene
 
 SHIFT = 2 * GRID_LIMIT
-# Pairs of a point and a triangle that are looked at together.
-PAIRS = 200_000
+# Pairs of a point and a triangle that are looked at together: they stay in the cache.
+PAIRS = 1 << 13
 
 
 def closed_elements(scene: Scene, *roles: Role) -> list[tuple[int, np.ndarray]]:
@@ -22,11 +22,14 @@ def closed_elements(scene: Scene, *roles: Role) -> list[tuple[int, np.ndarray]]:
         (object_id, triangles (m, 3, 3) int32) of each.
     """
     triangles, _ = scene.triangles()
-    starts, found = scene.triangle_starts, []
-    for object_id in np.flatnonzero(scene.object_mask(*(roles or OPAQUE))):
-        part = triangles[starts[object_id] : starts[object_id + 1]]
-        if len(part) >= 4 and is_closed(part):
-            found.append((int(object_id), part))
+    starts, models, found = scene.triangle_starts, scene.first_alike.tolist(), []
+    closed: dict[int, bool] = {}
+    for object_id in np.flatnonzero(scene.object_mask(*(roles or OPAQUE))).tolist():
+        part, model = triangles[starts[object_id] : starts[object_id + 1]], models[object_id]
+        if model not in closed:
+            closed[model] = len(part) >= 4 and is_closed(part)
+        if closed[model]:
+            found.append((object_id, part))
     return found
 
 
@@ -55,9 +58,13 @@ def winding_numbers(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         1983, "The solid angle of a plane triangle".
     """
     out = np.zeros(len(points))
-    for begin in range(0, len(points), max(1, 2_000_000 // max(1, len(triangles)))):
-        stop = begin + max(1, 2_000_000 // max(1, len(triangles)))
-        out[begin:stop] = _half_angles(triangles[None] - points[begin:stop, None, None]).sum(axis=1) / (2 * np.pi)
+    # Corner by corner and coordinate by coordinate: NumPy is many times slower along short axes.
+    corners, places = triangles.astype(float).transpose(1, 2, 0), points.T
+    step = max(1, PAIRS // max(1, len(triangles)))
+    for begin in range(0, len(points), step):
+        at = places[:, begin : begin + step, None]
+        angles = _half_angles(*([corner[i][None] - at[i] for i in range(3)] for corner in corners))
+        out[begin : begin + step] = angles.sum(axis=1) / (2 * np.pi)
     return out
 
 
@@ -74,18 +81,26 @@ def winds_around(points: np.ndarray, row: np.ndarray, triangles: np.ndarray) -> 
 
 def _windings(points: np.ndarray, row: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """As `winding_numbers`, of a surface for each point; arguments as of `winds_around`."""
-    return np.bincount(row, _half_angles(triangles - points[row, None]), minlength=len(points)) / (2 * np.pi)
+    places, angles = points.T, np.empty(len(row))
+    for begin in range(0, len(row), PAIRS):
+        part = slice(begin, begin + PAIRS)
+        corners, at = triangles[part].astype(float).transpose(1, 2, 0), places[:, row[part]]
+        angles[part] = _half_angles(*([corner[i] - at[i] for i in range(3)] for corner in corners))
+    return np.bincount(row, angles, minlength=len(points)) / (2 * np.pi)
 
 
-def _half_angles(corners: np.ndarray) -> np.ndarray:
-    """Half of the solid angles of triangles about the origin, shape (..., 3, 3), signed."""
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = np.moveaxis(corners.astype(float), (-2, -1), (0, 1))
-    la, lb, lc = (np.sqrt(x * x + y * y + z * z) for x, y, z in ((ax, ay, az), (bx, by, bz), (cx, cy, cz)))
-    top = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-    bottom = la * lb * lc + (ax * bx + ay * by + az * bz) * lc
-    bottom += (bx * cx + by * cy + bz * cz) * la + (cx * ax + cy * ay + cz * az) * lb
+def _half_angles(a: list[np.ndarray], b: list[np.ndarray], c: list[np.ndarray]) -> np.ndarray:
+    """Half of the solid angles of triangles about the origin, signed; corners by coordinate, float64."""
+    la, lb, lc = (np.sqrt(_dot(x, x)) for x in (a, b, c))
+    top = _dot(a, [b[i - 2] * c[i - 1] - b[i - 1] * c[i - 2] for i in range(3)])
+    bottom = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
     # In the plane of a triangle the sign of a zero would say on which side the point is: on it, it is on neither.
     return np.where(top == 0.0, 0.0, np.arctan2(top, bottom))
+
+
+def _dot(a: list[np.ndarray], b: list[np.ndarray]) -> np.ndarray:
+    """Scalar products of vectors by coordinate."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def triangles_meet_boxes(triangles: np.ndarray, boxes: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ..data.errors import InputError
+from ..data.ragged import owners_of, places_of, starts_of
 from .launch import CPU, Device, launch_rows
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -161,7 +162,9 @@ def integer_normals(triangles: np.ndarray) -> np.ndarray:
     return np.cross(a, b)
 
 
-def build_cones(elements: list[tuple[int, np.ndarray]], counts: np.ndarray) -> NormalCones:
+def build_cones(
+    elements: list[tuple[int, np.ndarray]], counts: np.ndarray, models: np.ndarray | None = None
+) -> NormalCones:
     """Normal cones of the opaque shells that are closed and turned outwards; no other triangle may be culled.
 
     A shell (triangles joined by edges) of an element whose directed edges all pair off counts if its volume is
@@ -171,13 +174,51 @@ def build_cones(elements: list[tuple[int, np.ndarray]], counts: np.ndarray) -> N
     Args:
         elements: (object_id, triangles (m, 3, 3) int32) of each closed opaque element, in object order.
         counts: triangles of each object, those that may not be culled included, shape (objects,), int.
+        models: of each object the first that is alike (`Scene.first_alike`), shape (objects,), int: saves time.
     """
-    owners = np.concatenate(
-        [np.full(len(part), owner, np.int32) for owner, part in elements] or [np.zeros(0, np.int32)]
-    )
-    triangles = np.concatenate([part for _, part in elements] or [np.zeros((0, 3, 3), np.int32)])
+    ids = np.array([owner for owner, _ in elements], np.int64)
+    # The first element of each shape stands for the others.
+    _, first, same = np.unique(ids if models is None else models[ids], return_index=True, return_inverse=True)
+    chosen = [elements[k] for k in np.sort(first)]
+    owners = np.concatenate([np.full(len(part), owner, np.int32) for owner, part in chosen] or [np.zeros(0, np.int32)])
+    triangles = np.concatenate([part for _, part in chosen] or [np.zeros((0, 3, 3), np.int32)])
     kept = _outward(triangles, owners)
-    return _hierarchy(triangles[kept], owners[kept], counts)
+    cones = _hierarchy(triangles[kept], owners[kept], counts)
+    if len(chosen) == len(elements):
+        return cones
+    model = ids[first[same]]
+    corners = np.array([part[0, 0] for _, part in elements])
+    return _copied(cones, ids, model, corners - corners[first[same]])
+
+
+def _copied(cones: NormalCones, ids: np.ndarray, models: np.ndarray, shift: np.ndarray) -> NormalCones:
+    """Cones of objects, each those of its model shifted [grid steps], shape (objects, 3)."""
+    # Triangles of each object are together as it is; now its nodes are, too.
+    node_owner = cones.owners[cones.ranges[:, 0]] if len(cones.ranges) else np.zeros(0, np.int32)
+    order = np.argsort(node_owner, kind="stable")
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    nodes = [np.searchsorted(node_owner[order], models, side=side) for side in ("left", "right")]
+    places = [np.searchsorted(cones.owners, models, side=side) for side in ("left", "right")]
+    node_starts, starts = (starts_of(high - low) for low, high in (nodes, places))
+    node, triangle = (places_of(low, high - low) for low, high in (nodes, places))
+    by_node, by_triangle = owners_of(node_starts), owners_of(starts)
+    links = cones.links[order[node]]
+    links = np.where(links >= 0, rank[links] + (node_starts[:-1] - nodes[0])[by_node, None], -1)
+    ranges = cones.ranges[order[node]] + (starts[:-1] - places[0])[by_node, None]
+    roots = np.full(len(cones.counts), -1, np.int32)
+    some = np.diff(node_starts) > 0
+    roots[ids[some]] = node_starts[:-1][some]
+    return NormalCones(
+        (cones.triangles[triangle] + shift[by_triangle, None]).astype(np.int32),
+        ids[by_triangle].astype(np.int32),
+        cones.counts,
+        (cones.boxes[order[node]] + shift[by_node, None]).astype(np.int32),
+        cones.cones[order[node]],
+        links.astype(np.int32),
+        ranges.astype(np.int32),
+        roots,
+    )
 
 
 def _outward(triangles: np.ndarray, owners: np.ndarray) -> np.ndarray:

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ..data.ragged import starts_of
+from ..data.shapes import copies, mostly_copies
 from .launch import CPU, Scratch, launch_slots
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -312,3 +314,39 @@ def build_hierarchy(boxes: np.ndarray) -> Hierarchy:
     nodes = CPU.zeros(2 * count - 1, Node)
     launch_slots(_build, 1, [lo, hi], Scratch(int(WORK_SIZE), count + int(STACK_SIZE)), [nodes], CPU)
     return Hierarchy(nodes.numpy())
+
+
+def build_of_copies(boxes: np.ndarray, starts: np.ndarray, models: np.ndarray) -> Hierarchy:
+    """Hierarchy over groups of boxes, some of which are others shifted: as `build_hierarchy`, of many soon made.
+
+    Where it pays, each group has a tree of its own under one of all groups, and those that are alike are cut up once.
+
+    Args:
+        boxes: as of `build_hierarchy`.
+        starts: boxes of group g are starts[g]:starts[g + 1], shape (groups + 1,), int.
+        models: of each group the first one that is the same but for a shift, shape (groups,), int.
+    """
+    if not mostly_copies(starts, models):
+        return build_hierarchy(boxes)
+    groups = np.flatnonzero(np.diff(starts))
+    around = [least.reduceat(boxes[:, side], starts[groups]) for side, least in ((0, np.minimum), (1, np.maximum))]
+    top = build_hierarchy(np.stack(around, axis=1)).nodes
+    leaf = np.flatnonzero(top[:, 7] >= 0)
+    group = groups[top[leaf, 7]]
+    sizes = np.ones(len(top), np.int64)
+    sizes[leaf] = 2 * np.diff(starts)[group] - 1
+    # In place of a leaf of the upper tree stands the tree of its group.
+    places = starts_of(sizes)
+    nodes = np.empty((places[-1], 8), np.int32)
+    top[:, 3] = places[top[:, 3]]
+    nodes[places[:-1]] = top
+    begins = np.empty(len(models), np.int64)
+    begins[group] = places[leaf]
+    for model, members in copies(starts, models):
+        own = build_hierarchy(boxes[starts[model] : starts[model + 1]]).nodes
+        shift = boxes[starts[members], 0] - boxes[starts[model], 0]
+        moved = np.column_stack([shift, begins[members], shift, starts[members]]).astype(np.int32)
+        made = own[None] + moved[:, None]
+        made[:, own[:, 7] < 0, 7] = -1
+        nodes[begins[members][:, None] + np.arange(len(own))] = made
+    return Hierarchy(nodes)

@@ -55,10 +55,10 @@ class Sights:
         scene = model.scene
         everything, owners = scene.triangles()
         opaque = scene.object_mask(*OPAQUE)[owners]
-        triangles = device_triangles(everything, owners, device, opaque=opaque)
+        triangles = device_triangles(everything, owners, device, opaque=opaque, models=scene.first_alike)
         starts = np.searchsorted(owners, np.arange(len(scene.objects) + 1))
         ranges, solids = np.column_stack([starts[:-1], starts[1:]]), SolidIndex(cells, model.closed)
-        finder = Finder(everything, owners, opaque, device)
+        finder = Finder(everything, owners, opaque, device, scene.first_alike)
         return cls(model, cells, triangles, ranges, solids, plans, seed, device, finder)
 
     def from_cells(self, cells: np.ndarray) -> "Sights":

@@ -6,6 +6,7 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
+from ...data.shapes import shared_corners
 from ...kernels.launch import Device
 
 # Rays that a thread casts at a time.
@@ -20,14 +21,23 @@ class Finder:
         owners: object of each, and -1 for none, shape (m + 1,), int.
     """
 
-    def __init__(self, triangles: np.ndarray, owners: np.ndarray, opaque: np.ndarray, device: Device) -> None:
-        """Build the scene of those triangles that are opaque, shape (m,), bool."""
+    def __init__(
+        self,
+        triangles: np.ndarray,
+        owners: np.ndarray,
+        opaque: np.ndarray,
+        device: Device,
+        models: np.ndarray | None = None,
+    ) -> None:
+        """Build the scene of those triangles that are opaque, shape (m,), bool; `models` as of `device_triangles`."""
         self.triangles, self.owners, self._device, self._scene = triangles, np.append(owners, -1), device, None
         self._index = np.append(np.flatnonzero(opaque), -1)
         if opaque.any():
             self._scene = EmbreeScene(robust=True)
-            corners = triangles[opaque].reshape(-1, 3).astype(np.float32)
-            TriangleMesh(self._scene, corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+            models = np.arange(int(owners.max()) + 1) if models is None else models
+            # Most of the time goes into handing over corners, one by one.
+            corners, places = shared_corners(triangles, np.searchsorted(owners, np.arange(len(models) + 1)), models)
+            TriangleMesh(self._scene, corners.astype(np.float32), places[opaque])
             # The first ray commits the scene, which must not happen on two threads at once.
             self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
 

@@ -102,6 +102,8 @@ def descend(
     first_level: int,
     hide: Callable[[np.ndarray, np.ndarray], np.ndarray],
     clear: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+    *,
+    haste: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Go down a hierarchy of items from view cells, and give up below every node that is hidden.
 
@@ -113,13 +115,17 @@ def descend(
         first_level: to start at: the root is visible from everywhere.
         hide: says of cells and boxes, row by row, which boxes are hidden.
         clear: says of them which boxes the cells do not meet; by default as `apart`.
+        haste: where a view cell has few nodes of a level hidden, go on to its items: so many proofs are not made for
+            nothing, and where there is a proof there are more.
 
     Returns:
-        View cell and item of every pair that is left, ordered, int64: neither the item's box nor one around it is
-        hidden.
+        View cell and item of every pair that is left, ordered, int64: neither the item's box nor one around it, of
+        those that were asked about, is hidden.
     """
     clear = clear or (lambda source, boxes: apart(cells[source], boxes))
-    level = min(first_level, len(levels) - 1)
+    last = len(levels) - 1
+    level = min(first_level, last)
+    patient = np.ones(len(cells), bool)
     source = np.repeat(block, 2**level)
     node = np.tile(np.arange(2**level), len(block))
     while True:
@@ -127,13 +133,20 @@ def descend(
         present = (boxes[:, 0] <= boxes[:, 1]).all(axis=1)
         source, node, boxes = source[present], node[present], boxes[present]
         left = np.ones(len(node), bool)
-        rows = np.flatnonzero(clear(source, boxes))
+        rows = np.flatnonzero(patient[source] | (level == last))
+        rows = rows[clear(source[rows], boxes[rows])]
         left[rows] = ~hide(source[rows], boxes[rows])
-        source, node = source[left], node[left]
-        if level == len(levels) - 1:
+        if level == last:
             break
         level += 1
+        if haste:
+            asked, hidden = (np.bincount(source[some], minlength=len(cells)) for some in (rows, rows[~left[rows]]))
+            # A proof about a node saves all that is below it, and takes the longer the more that is.
+            below = last - level
+            patient &= (asked == 0) | (hidden * 2.0**below > asked * (1 + below / 2))
+        source, node = source[left], node[left]
         source, node = np.repeat(source, 2), (2 * node[:, None] + [0, 1]).ravel()
+    source, node = source[left], node[left]
     target = items[node].astype(np.int64)
     order = np.lexsort((target, source))
     return source[order].astype(np.int64), target[order]

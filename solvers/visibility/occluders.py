@@ -117,7 +117,9 @@ def seen_objects(
     clear = partial(_clear, model, NO_PLANS)
     own = [frame.places(block) >= 0 for frame in model.frames]
     rest = block[~np.any([np.zeros(len(block), bool), *own], axis=0)]
-    found = [descend(model.cells, rest, occludees.levels, occludees.objects, FIRST_LEVEL, hide, clear)]
+    # A certificate of a node serves for all below it.
+    way = {"clear": clear, "haste": ledger is None}
+    found = [descend(model.cells, rest, occludees.levels, occludees.objects, FIRST_LEVEL, hide, **way)]
     found += [
         frame.left(block[mine], FIRST_LEVEL, NODE_CAP)
         for frame, mine in zip(model.frames, own, strict=True)
@@ -151,7 +153,7 @@ def left_by_groups(model: OccluderModel, cells: np.ndarray, group: np.ndarray, k
     )
     around, occludees = model.from_cells(boxes), model.occludees
     hide, clear = partial(_hide_nodes, around, None), partial(_clear, around, NO_PLANS)
-    found = descend(boxes, np.arange(count), occludees.levels, occludees.objects, FIRST_LEVEL, hide, clear)
+    found = descend(boxes, np.arange(count), occludees.levels, occludees.objects, FIRST_LEVEL, hide, clear, haste=True)
     rows = Rows.unseen(*found)
     group_of = np.full(len(model.cells), -1)
     group_of[cells] = group

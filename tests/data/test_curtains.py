@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from builders import random_solids
+from viewcell.data import curtains
 from viewcell.data.curtains import FALLING, clearly_missed, crossed, find_curtains, meeting
 from viewcell.data.prepared import PreparedModel
 from viewcell.data.scene import GRID_M
@@ -109,6 +110,24 @@ def test_curtains_reach_nearly_from_end_to_end():
     boxes = PreparedModel(scene).curtains.boxes * GRID_M
     assert np.hypot(*(boxes[:, 1] - boxes[:, 0])[:, :2].T).max() > 4.95
     assert (boxes[:, 1, 2] - boxes[:, 0, 2]).max() == 3.0
+
+
+def test_walls_that_are_alike_have_the_same_curtains_each_where_it_stands(monkeypatch):
+    places = [(0, 0, 0), (7, 0, 0), (-3, 11, 2.5)]
+    walls = [upright(random_solids.box([0, 0, 0], [5, 0.2, 3]), 17, place) for place in places]
+    cut = []
+    sections = curtains._sections
+    monkeypatch.setattr(curtains, "_sections", lambda *given: cut.append(1) or sections(*given))
+    scene = random_solids.scene_of_meshes(walls)
+    found = PreparedModel(scene).curtains
+    assert len(cut) == 1
+    assert all(opaque(found, OpaqueSurfaces(*scene.triangles())))
+    # Faces come after what is inside of all.
+    inside = len(found.axis) - 4 * len(places)
+    # Of every curtain the copies come one after the other.
+    each = found.boxes[:inside].reshape(-1, 3, 2, 3).transpose(1, 0, 2, 3)
+    for mine, place in zip(each, places, strict=True):
+        assert (mine - each[0] == np.round(np.array(place) / GRID_M)).all()
 
 
 def test_models_along_the_axes_and_small_ones_have_none():

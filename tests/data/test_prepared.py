@@ -1,14 +1,18 @@
 """A model prepared once: each part is made once, from the right triangles, and names what it is made of."""
 
+from dataclasses import replace
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from builders import random_solids, small_house
 from viewcell.data import prepared
 from viewcell.data.buildings.arcade import ARCH_M, BAY_M, SPRING_M, make_arcade
 from viewcell.data.buildings.shell import OUTER_WALL_M
+from viewcell.data.patches import find_patches
 from viewcell.data.prepared import PreparedModel, no_patches
 from viewcell.data.regions import no_regions
-from viewcell.data.scene import GRID_M, Definition, Instance, Mesh, Role, Scene
+from viewcell.data.scene import GRID_M, OPAQUE, Definition, Instance, Mesh, Role, Scene
 from viewcell.verify.proofs.opaque import bounds_disc
 
 
@@ -37,6 +41,37 @@ def test_patches_name_their_triangles_among_all_of_their_object():
     triangles, starts = scene.triangles()[0], scene.triangle_starts
     members = triangles[starts[1] + patches.members[0]]
     assert bounds_disc(members, patches.corners.tolist())
+
+
+def test_objects_that_are_alike_have_the_same_patches_each_where_it_stands():
+    """As if they were found for each object; what is not opaque lends its shape and has none."""
+    shape = object_of(slanted(3.0), slanted(2.0, (9, 0, 0)), slanted(0.05, (5, 0, 0)))
+    scene = scene_of(*[shape] * 4, object_of(slanted(4.0)))
+    for number, at in enumerate([(0, 0, 0), (33.25, -7, 2), (-1234.5, 991.75, 12), (1, 1, 1)]):
+        scene.objects[number].transform[:3, 3] = at
+    scene.objects[0] = replace(scene.objects[0], role=Role.TRANSPARENT)
+    found = PreparedModel(scene).patches
+    corners, owners = scene.triangles(*OPAQUE)
+    wanted = find_patches(corners, owners, least_area=prepared.PATCH_M2 / GRID_M**2)
+    assert sorted(found.owner.tolist()) == [1, 1, 2, 2, 3, 3, 4]
+
+    def of(patches):
+        loops = zip(patches.starts[:-1], patches.starts[1:], patches.owner, strict=True)
+        return {(int(owner), patches.corners[a:b].tobytes()): k for k, (a, b, owner) in enumerate(loops)}
+
+    mine, theirs = of(found), of(wanted)
+    assert mine.keys() == theirs.keys()
+    for key, k in mine.items():
+        j = theirs[key]
+        assert (found.boxes[k] == wanted.boxes[j]).all() and (found.normal[k] == wanted.normal[j]).all()
+        assert found.area[k] == wanted.area[j] and found.members[k].tolist() == wanted.members[j].tolist()
+        # No narrower than the patch itself, in exact arithmetic, and hardly wider.
+        points = scene.triangles()[0][scene.triangle_starts[found.owner[k]] + found.members[k]].reshape(-1, 3)
+        normal = [Fraction(float(x)) for x in found.normal[k]]
+        heights = [sum(int(x) * n for x, n in zip(point, normal, strict=True)) for point in points]
+        low, high = (Fraction(float(x)) for x in found.depth[k])
+        assert low <= min(heights) and max(heights) <= high
+        assert np.abs(found.depth[k] - wanted.depth[j]).max() < 1e-6
 
 
 def test_every_part_is_made_once(monkeypatch):

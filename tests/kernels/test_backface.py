@@ -19,7 +19,7 @@ from viewcell.verify.rays.embree import embree_scene
 
 
 def cones_of(scene):
-    return build_cones(closed_elements(scene), scene.triangle_counts)
+    return build_cones(closed_elements(scene), scene.triangle_counts, scene.first_alike)
 
 
 def scene_of(*meshes, role=Role.DETAIL):
@@ -60,6 +60,24 @@ def removed(scene, boxes, **options):
 def random_boxes(rng, bounds, count, size):
     low = rng.integers(bounds[0] - size, bounds[1], (count, 3))
     return np.stack([low, low + rng.integers(1, size, (count, 3))], axis=1)
+
+
+def test_copies_count_as_their_models_do_where_they_stand():
+    """Shapes between their copies, one of them inside out, one of many nodes: as if each were looked at alone."""
+    ball, box = icosphere(3000), box_mesh([0, 0, 0], [900, 700, 500])
+    shapes = [ball, (box[0], box[1][:, ::-1]), box]
+    rng = np.random.default_rng(5)
+    places = [shape for _ in range(4) for shape in shapes]
+    meshes = [(vertices + rng.integers(-9000, 9000, 3), faces) for vertices, faces in places]
+    scene = scene_of(*meshes)
+    assert (scene.first_alike == np.arange(12) % 3).all()
+    boxes = random_boxes(rng, np.array([[-12000] * 3, [12000] * 3]), 20, 3000)
+    rows = np.stack(np.meshgrid(np.arange(20), np.arange(12), indexing="ij"), axis=-1).reshape(-1, 2)
+    plain = launch_backface(build_cones(closed_elements(scene), scene.triangle_counts), boxes, rows)
+    found = launch_backface(cones_of(scene), boxes, rows)
+    np.testing.assert_array_equal(found[0], plain[0])
+    np.testing.assert_array_equal(found[1], plain[1])
+    assert (found[0].reshape(20, 4, 3)[:, :, 1] == 0).all() and len(np.unique(found[0])) > 40
 
 
 def test_cells_about_a_sphere():

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from viewcell.kernels.hierarchy import build_hierarchy
+from viewcell.kernels import hierarchy
+from viewcell.kernels.hierarchy import build_hierarchy, build_of_copies
 
 
 def random_boxes(rng, count):
@@ -33,6 +34,43 @@ def test_finds_what_a_loop_finds(count):
     for query in random_boxes(rng, 50) if count else np.zeros((1, 2, 3), int):
         truth = np.flatnonzero((boxes[:, 0] <= query[1]).all(axis=1) & (boxes[:, 1] >= query[0]).all(axis=1))
         assert sorted(items_met(tree, query)[0]) == truth.tolist()
+
+
+def some_copies(rng, shapes, times):
+    """Boxes of groups, some empty, most of them others shifted; where each begins, and its model."""
+    groups, models = [], []
+    for count in shapes:
+        shape, first = random_boxes(rng, count), len(groups)
+        for _ in range(times):
+            groups += [shape + rng.integers(-(2**21), 2**21, 3), np.zeros((0, 2, 3), int)]
+            models += [first, len(groups) - 1]
+    order = rng.permutation(len(groups))
+    # The first of those that are alike, in the new order.
+    names = np.array(models)[order]
+    firsts = np.array([np.flatnonzero(names == name)[0] for name in names])
+    starts = np.concatenate([[0], np.cumsum([len(groups[k]) for k in order])])
+    return np.concatenate([groups[k] for k in order]).astype(np.int32), starts, firsts
+
+
+@pytest.mark.parametrize("apart", [True, False])
+@pytest.mark.parametrize("shapes", [(1,), (5,), (1, 2, 40), (300, 7)])
+def test_copies_find_what_a_loop_finds(monkeypatch, shapes, apart):
+    """Whether groups have trees of their own or not."""
+    monkeypatch.setattr(hierarchy, "mostly_copies", lambda *_: apart)
+    rng = np.random.default_rng(len(shapes))
+    boxes, starts, models = some_copies(rng, shapes, 6)
+    tree = build_of_copies(boxes, starts, models)
+    leaves = tree.links[:, 1] >= 0
+    assert len(tree.links) == 2 * len(boxes) - 1
+    np.testing.assert_array_equal(tree.boxes[leaves], boxes[tree.links[leaves, 1]])
+    for query in random_boxes(rng, 100):
+        query[1] += 2**20
+        truth = np.flatnonzero((boxes[:, 0] <= query[1]).all(axis=1) & (boxes[:, 1] >= query[0]).all(axis=1))
+        assert sorted(items_met(tree, query)[0]) == truth.tolist()
+
+
+def test_groups_that_are_nothing_have_no_tree():
+    assert len(build_of_copies(np.zeros((0, 2, 3), np.int32), np.zeros(4, int), np.arange(3)).nodes) == 0
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 64, 100])

@@ -331,7 +331,8 @@ def _triangle_counts(model: PreparedModel, graph: CellGraph, rows: Rows, device:
     from ...kernels.backface import build_cones, launch_backface
 
     sizes, pairs = model.scene.triangle_counts, np.column_stack([rows.source, rows.target])
-    removed, whole = launch_backface(build_cones(model.closed, sizes), graph.cells, pairs, device=device)
+    cones = build_cones(model.closed, sizes, model.scene.first_alike)
+    removed, whole = launch_backface(cones, graph.cells, pairs, device=device)
     return {"potential_triangles": int(sizes[rows.target].sum()), "back_facing_triangles": int(removed[~whole].sum())}
 
 

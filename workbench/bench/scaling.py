@@ -1,14 +1,14 @@
 """Bakes by occluders of ever larger synthetic scenes: seconds by phase, cost of a view cell, memory, overestimate.
 
-Run `python -m viewcell.workbench.bench scaling --scene plant --triangles 100000 1000000 --cells 1000 --budget 300 --out
-FOLDER`. View cells are boxes of 1 m to 2 m drawn at random in the scene's spaces. Each size runs in a process of its
-own, so that its peak memory is its own. The table goes to standard output, and with the picture into FOLDER.
+Run `python -m viewcell.workbench.bench scaling --scene plant --triangles 100000 1000000 --cells 1000 --budget 300
+--threads 1 --out FOLDER`. View cells are boxes of 1 m to 2 m drawn at random in the scene's spaces. Each size runs in a
+process of its own, so that its peak memory is its own. The table goes to standard output, and with the picture into
+FOLDER, where the bakes stay, for `viewcell verify`; below it the exponents of growth.
 """
 
 import argparse
 import multiprocessing
 import resource
-import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -26,6 +26,7 @@ from ...data.scene import Scene
 from ...data.store.graph_folder import CELL_COLUMNS
 from ..bake.run import bake
 from ..bake.settings import Settings
+from .growth import fit
 from .timing import commit
 
 SCENES = {"plant": make_plant, "city": make_city}
@@ -45,6 +46,7 @@ HEAD = (
     "potential a cell",
     "seen a cell",
     "overestimate",
+    "kept %",
     "cells reached",
     "commit",
 )
@@ -59,6 +61,7 @@ class Measured:
         bounded: cells for which something was proved hidden.
         potential: pairs (cell, object) in the potentially visible sets of bounded cells.
         seen: those with a witness.
+        kept: share of the objects that a cell keeps, mean by volume, cells that were not reached included.
         peak_gb: most memory of the process, making the scene included.
     """
 
@@ -72,7 +75,13 @@ class Measured:
     bounded: int
     potential: int
     seen: int
+    kept: float
     peak_gb: float
+
+    @property
+    def before_s(self) -> float:
+        """All that comes before the first cell [s]."""
+        return sum(self.phases.get(phase, 0.0) for phase in BEFORE)
 
     @property
     def cell_ms(self) -> float:
@@ -95,6 +104,7 @@ class Measured:
             f"{self.potential / each:,.0f}",
             f"{self.seen / each:,.0f}",
             f"{self.potential / self.seen:.2f}" if self.seen else "-",
+            f"{100 * self.kept:.2g}",
             f"{self.bounded:,}",
             commit(),
         ]
@@ -111,19 +121,22 @@ def cells_in_spaces(scene: Scene, count: int, seed: int = 0) -> np.ndarray:
     return np.stack([low, low + extent], axis=1)
 
 
-def measure(name: str, triangles: int, cells: int, budget_s: float, device: str) -> Measured:
-    """Make a scene and bake it; call it in a fresh process."""
+def measure(
+    name: str, triangles: int, cells: int, budget_s: float, device: str, threads: int | None, folder: Path
+) -> Measured:
+    """Make a scene and bake it into a folder; call it in a fresh process."""
     started = time.perf_counter()
     scene = SCENES[name](triangles=triangles)
     made_s = time.perf_counter() - started
-    with tempfile.TemporaryDirectory() as scratch:
-        table = Path(scratch) / "cells.csv"
-        boxes = cells_in_spaces(scene, cells).reshape(-1, 6).T
-        pyarrow.csv.write_csv(pa.table(dict(zip(CELL_COLUMNS[1:], boxes, strict=True))), table)
-        settings = Settings(method="occluders", cells=str(table))
-        made = bake(scene, Path(scratch) / "x.bake", settings=settings, budget_s=budget_s, device=device)
-        source = made.cell_to_object["cell_id"].to_numpy()
-        seen = np.array(made.cell_to_object["verdict"].to_pylist(), object) == "visible"
+    at = folder / f"{name}-{triangles}"
+    at.mkdir(parents=True, exist_ok=True)
+    boxes = cells_in_spaces(scene, cells).reshape(-1, 6).T
+    pyarrow.csv.write_csv(pa.table(dict(zip(CELL_COLUMNS[1:], boxes, strict=True))), at / "cells.csv")
+    settings = Settings(method="occluders", cells=str(at / "cells.csv"))
+    run = {"budget_s": budget_s, "device": device, "threads": threads, "overwrite": True}
+    made = bake(scene, at / "scene.bake", settings=settings, **run)
+    source = made.cell_to_object["cell_id"].to_numpy()
+    seen = np.array(made.cell_to_object["verdict"].to_pylist(), object) == "visible"
     sizes = np.bincount(source, minlength=cells)
     # A cell that the budget did not reach keeps every object.
     bounded = sizes < len(scene.objects)
@@ -138,6 +151,7 @@ def measure(name: str, triangles: int, cells: int, budget_s: float, device: str)
         bounded=int(bounded.sum()),
         potential=int(sizes[bounded].sum()),
         seen=int(seen[bounded[source]].sum()),
+        kept=made.manifest["kept"]["objects"],
         peak_gb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20,
     )
 
@@ -153,12 +167,35 @@ def draw(rows: list[Measured], path: Path) -> None:
             axes.plot(
                 sizes, [row.cell_ms / 1000 for row in own], f"{marker}-", color=colour, label=f"{name}: a view cell"
             )
-            before = [sum(row.phases[phase] for phase in BEFORE) for row in own]
-            axes.plot(sizes, before, f"{marker}--", color=colour, label=f"{name}: before the first cell")
+            axes.plot(
+                sizes,
+                [row.before_s for row in own],
+                f"{marker}--",
+                color=colour,
+                label=f"{name}: before the first cell",
+            )
     axes.set(xscale="log", yscale="log", xlabel="triangles", ylabel="seconds")
     axes.grid(alpha=0.3, which="both")
     axes.legend()
     figure.savefig(path, dpi=120)
+
+
+def exponents(rows: list[Measured]) -> list[str]:
+    """Slopes of log cost over log triangles by least squares, a line for each scene with several sizes."""
+    lines = []
+    for name in dict.fromkeys(row.scene for row in rows):
+        own = [row for row in rows if row.scene == name]
+        sizes = [row.triangles for row in own]
+        if len(set(sizes)) < 2:
+            continue
+        costs = {
+            "before the first cell": [row.before_s for row in own],
+            "a cell": [row.cell_ms for row in own],
+            "memory": [row.peak_gb for row in own],
+        }
+        slopes = ", ".join(f"{cost} {fit(sizes, values)[0]:.2f}" for cost, values in costs.items())
+        lines.append(f"{name}, exponents in triangles: {slopes}")
+    return lines
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -168,6 +205,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cells", type=int, default=1000)
     parser.add_argument("--budget", type=float, default=300.0, help="seconds of visibility for each bake")
     parser.add_argument("--device", default="cpu")
+    parser.add_argument("--threads", type=int, help="CPU threads; all cores by default")
     parser.add_argument("--out", type=Path, required=True, metavar="FOLDER")
 
 
@@ -178,11 +216,13 @@ def run(options: argparse.Namespace) -> int:
     print(*lines, sep="\n", flush=True)
     rows = []
     for name, triangles in product(options.scene, options.triangles):
-        case = (name, triangles, options.cells, options.budget, options.device)
+        case = (name, triangles, options.cells, options.budget, options.device, options.threads, options.out)
         with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
             rows.append(pool.submit(measure, *case).result())
         lines.append("| " + " | ".join(rows[-1].columns()) + " |")
         print(lines[-1], flush=True)
-        (options.out / "scaling.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        text = "\n".join([*lines, "", *exponents(rows)])
+        (options.out / "scaling.md").write_text(text.rstrip() + "\n", encoding="utf-8")
         draw(rows, options.out / "scaling.png")
+    print(*exponents(rows), sep="\n")
     return 0
