@@ -194,8 +194,13 @@ class Rasters:
         """
         (u_first, u_last), (v_first, v_last) = (self.runs(blocked, axis) for axis in (0, 1))
         found: set[tuple[int, int, int, int, int]] = set()
+        # Rasters that are blocked throughout, as most small ones are, hold one rectangle.
+        full = self._count(blocked) == (self.sizes[0] - 1) * (self.sizes[1] - 1)
+        whole = np.flatnonzero(full & (self._count(wanted) > 0))
+        none = np.zeros(len(whole), np.int64)
+        whole = np.column_stack([whole, none, self.sizes[0][whole] - 1, none, self.sizes[1][whole] - 1])
         # Bytes are searched for the next cell that is left as fast as memory is read.
-        memory = bytearray(wanted.tobytes())
+        memory = bytearray((wanted & ~np.repeat(full, np.diff(self.nodes))).tobytes())
         left = np.frombuffer(memory, bool)
         starts, steps = self.nodes.tolist(), self.sizes[1].tolist()
         cell = owner = -1
@@ -213,7 +218,13 @@ class Rasters:
             for _, a, b, c, d in {tall, wide}:
                 left[start + a * step : start + b * step].reshape(-1, step)[:, c:d] = False
             found |= {tall, wide}
-        return self._corners(np.array(sorted(found), np.int64).reshape(-1, 5))
+        rows = np.concatenate([whole, np.array(sorted(found), np.int64).reshape(-1, 5)])
+        return self._corners(rows[np.argsort(rows[:, 0], kind="stable")])
+
+    def _count(self, mask: np.ndarray) -> np.ndarray:
+        """True cells of each raster."""
+        total = np.append(0, np.cumsum(mask))
+        return total[self.nodes[1:]] - total[self.nodes[:-1]]
 
     def _corners(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         owner, u0, u1, v0, v1 = rows.T
