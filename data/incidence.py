@@ -64,13 +64,19 @@ def populate(scene: Scene, cells: np.ndarray, clip: Callable[..., np.ndarray] = 
     triangles, starts = scene.triangles()[0], scene.triangle_starts
     bounds = scene.object_bounds()
     cell, object_id, whole = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0, bool)]
-    for index in np.flatnonzero(np.diff(starts)):
-        low, high = bounds[index]
-        near = np.flatnonzero((cells[:, 0] <= high).all(axis=1) & (cells[:, 1] >= low).all(axis=1))
-        inside = (cells[near, 0] <= low).all(axis=1) & (cells[near, 1] >= high).all(axis=1)
-        cell.append(near)
-        object_id.append(np.full(len(near), index))
-        whole.append(inside & (len(near) == 1))
+    present = np.flatnonzero(np.diff(starts))
+    step = max(1, CHUNK // max(1, len(cells)))
+    for first in range(0, len(present), step):
+        own = present[first : first + step]
+        low, high = bounds[own].transpose(1, 0, 2)
+        near = np.ones((len(own), len(cells)), bool)
+        for axis in range(3):
+            near &= (cells[:, 0, axis] <= high[:, axis, None]) & (cells[:, 1, axis] >= low[:, axis, None])
+        row, found = np.nonzero(near)
+        inside = (cells[found, 0] <= low[row]).all(axis=1) & (cells[found, 1] >= high[row]).all(axis=1)
+        cell.append(found)
+        object_id.append(own[row])
+        whole.append(inside & (near.sum(axis=1)[row] == 1))
     rows, objects, within = (np.concatenate(column) for column in (cell, object_id, whole))
     boxes = bounds[objects]
     own = objects[~within]
