@@ -148,6 +148,11 @@ class PreparedModel:
         """Objects and their pieces: what may be hidden."""
         return find_occludees(self.scene, exposed_faces(self.closed))
 
+    @cached_property
+    def whole_occludees(self) -> Occludees:
+        """The same with faces that other elements cover: certificates are checked against all triangles."""
+        return find_occludees(self.scene)
+
     def blockers(self, graph: CellGraph) -> Blockers:
         """What no sightline between live cells of a cell-and-portal graph of the model crosses."""
         return find_blockers(graph, self.blocking_planes)

@@ -67,7 +67,7 @@ class OccluderModel:
 
     @classmethod
     def of(
-        cls, sights: Sights, *, blockers: Blockers | None = None, shadows: bool = True, frames: bool = True
+        cls, sights: Sights, *, blockers: Blockers | None = None, shadows: bool = True, certify: bool = False
     ) -> "OccluderModel":
         """Copy a prepared model's occluders to the device.
 
@@ -75,7 +75,8 @@ class OccluderModel:
             sights: of the model.
             blockers: of its portal graph, if they are to hide too; they serve the search of lines only.
             shadows: whether regions and patches are to hide.
-            frames: whether view cells at an angle are searched in frames of their own too.
+            certify: hide only as certificates can say it: not in frames of view cells at an angle, and every face for
+                itself, also where another element stands against it.
         """
         model, device = sights.model, sights.device
         regions, patches = (model.regions, model.patches) if shadows else (no_regions(), no_patches())
@@ -84,9 +85,11 @@ class OccluderModel:
             walls = join_blockers([blockers, walls])
         smallest = tuple(round(size / model.scene.grid_m) for size in SMALLEST_M)
         shields = device_shields(regions, patches, device)
-        own = find_own_frames(model.scene, model.large_closed, sights.cells, sights.plans) if frames and shadows else []
+        wanted = shadows and not certify
+        own = find_own_frames(model.scene, model.large_closed, sights.cells, sights.plans) if wanted else []
         searches = tuple(FrameSearch.of(frame, device) for frame in own)
-        return cls(sights, model.occludees, blocker_tree(walls, device), shields, smallest, frames=searches)
+        occludees = model.whole_occludees if certify else model.occludees
+        return cls(sights, occludees, blocker_tree(walls, device), shields, smallest, frames=searches)
 
     @property
     def cells(self) -> np.ndarray:

@@ -81,7 +81,7 @@ class PortalEngine:
                 # Once for all blocks: what takes them no longer says nothing of the rest.
                 with phase("occluders"):
                     wp.load_module(shaft.__name__, device=self.model.device.name)
-                    self._occluders = OccluderModel.of(self._sights, frames=not self._certify)
+                    self._occluders = OccluderModel.of(self._sights, certify=self._certify)
             return self._occluders
 
     def compile(self) -> None:

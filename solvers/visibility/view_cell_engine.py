@@ -59,7 +59,7 @@ class ViewCellEngine:
         blockers = None if portal_graph is None or certify else model.blockers(portal_graph)
         sights = Sights.of(model, cells, seed, device, plans)
         shadows = method != "portals" or certify
-        self.model = OccluderModel.of(sights, blockers=blockers, shadows=shadows, frames=not certify)
+        self.model = OccluderModel.of(sights, blockers=blockers, shadows=shadows, certify=certify)
 
     @property
     def proof_occluders(self) -> tuple[Blockers, Regions, Patches]:

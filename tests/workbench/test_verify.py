@@ -493,6 +493,14 @@ def test_a_bake_with_prisms_stands(turned):
     assert (found.failed_proofs, found.uncovered, found.covered) == (0, 0, 3) and found.proofs >= 3
 
 
+def test_certificates_hold_all_faces_of_walls_that_others_cover(tmp_path):
+    """Walls of an office a little off the axes end at each other, where nobody sees their faces."""
+    office = make_office(floors=1, rooms_per_side=1, yaw_deg=0.15, furnished=False)
+    result = verify_bake(bake(office, tmp_path / "a.bake", yaw="0", certify=True, threads=1), rays=1000)
+    found = result.certificates
+    assert (found.failed_proofs, found.uncovered) == (0, 0) and found.covered > 200
+
+
 def test_what_is_left_out_of_a_prisms_rows_is_found(turned):
     """Each object that a witness shows from a prism is missed when it is called hidden."""
     kept = turned.potential_objects.copy()

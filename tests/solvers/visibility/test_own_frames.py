@@ -111,7 +111,7 @@ def test_frames_serve_the_cells_that_they_fit(house):
     """With frames no more is kept than without, and nothing that is seen is lost."""
     model, cells, plans = house
     with_frames, without = (
-        OccluderModel.of(Sights.of(model, cells, 0, CPU, plans), frames=frames) for frames in (True, False)
+        OccluderModel.of(Sights.of(model, cells, 0, CPU, plans), certify=certify) for certify in (False, True)
     )
     assert len(with_frames.frames) == 1 and not without.frames
     assert not with_frames.from_cells(cells).frames
