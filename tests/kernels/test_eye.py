@@ -137,6 +137,17 @@ def test_sets_of_whole_buildings_take_nothing_away():
     assert sets(free) == sets(bound) and sum(map(len, sets(free)))
 
 
+def test_near_portals_fill_the_screen():
+    """A wide portal that begins beside the eye: a corner of it is hardly before the eye at all."""
+    graph = row_of_rooms((-500, 500, -500, 500))
+    boxes = [[[1500, y, 0], [1501, y + 1, 1]] for y in (-8000, -400, 400, 8000)]
+    for limit in (0, 2000):
+        for yaw in (0.0, 45.0, 135.0):
+            path = camera([1000 - 1e-7, 500, 0], yaw)
+            wanted = seen_by_eye(graph, np.array(boxes), path.eyes[0], path.axes()[0], (np.tan(np.pi / 4),) * 2)[0]
+            assert wanted <= seen(graph, boxes, path, limit=limit)[0]
+
+
 def test_past_the_limit_rectangles():
     graph, _ = random_graph(5, walls=5)
     rng = np.random.default_rng(5)

@@ -13,35 +13,31 @@ from .searches import graph_of
 # As wide as it is high, and so wide that its sides run along the grid.
 SCREEN = Screen(100, 100, 90.0)
 HALF = (1.0, 1.0)
-# Portals of a case that eyes are put into.
-PORTALS = 2
 
 
 def eyes_of(case: GraphCase) -> np.ndarray:
-    """Where the traces start; and the middle, two corners, and the middles of two edges of the first portals."""
-    found = [np.array(trace.segment[0], float)[None] for trace in case.traces]
-    for _, _, rectangle in case.portals[:PORTALS]:
-        low, high = np.array(rectangle, float)
-        middle = (low + high) / 2
-        found.append(np.stack([middle, low, high, *(np.where(np.arange(3) == k, low, middle) for k in range(3))]))
-    return np.unique(np.concatenate(found), axis=0)
+    """Where the first trace starts; and the middle, a corner, and the middle of an edge of the first portal."""
+    low, high = np.array(case.portals[0][2], float)
+    middle = (low + high) / 2
+    edge = np.where(np.arange(3) == 2 - (low[2] == high[2]), low, middle)
+    return np.stack([middle, low, edge, *(np.array(trace.segment[0], float) for trace in case.traces[:1])])
 
 
 def boxes_of(case: GraphCase) -> np.ndarray:
-    """Objects: a whole cell, its floor, and its highest corner, of each cell."""
+    """Objects: the floor and the highest corner of each cell."""
     cells = np.array(case.cells)
     floors, corners = cells.copy(), cells.copy()
     floors[:, 1, 2] = floors[:, 0, 2]
     corners[:, 0] = corners[:, 1] - 1
-    return np.concatenate([cells, floors, corners])
+    return np.concatenate([floors, corners])
 
 
 def eye(cases: HardCases, device: Device) -> Outcomes:
-    """Eyes in each graph that look along the axes: all that rays meet, by the wedge and by rectangles."""
+    """Eyes in each graph that look along two axes: all that rays meet, by the wedge and by rectangles."""
     for case in cases.graph:
         graph, boxes, eyes = graph_of(case), boxes_of(case), eyes_of(case)
-        yaw = np.tile([0.0, 90.0, 180.0, 270.0], len(eyes))
-        path = CameraPath(np.repeat(eyes, 4, axis=0), yaw, np.zeros(len(yaw)), np.arange(len(yaw)) * 1.0)
+        yaw = np.tile([0.0, 90.0], len(eyes))
+        path = CameraPath(np.repeat(eyes, 2, axis=0), yaw, np.zeros(len(yaw)), np.arange(len(yaw)) * 1.0)
         model = eye_model(graph, boxes, 1.0, device=device)
         wanted = [seen_by_eye(graph, boxes, *view, HALF) for view in zip(path.eyes, path.axes(), strict=True)]
         outcome = Outcome.RIGHT
