@@ -52,7 +52,8 @@ def cells_holding(graph: CellGraph, points: np.ndarray) -> tuple[np.ndarray, np.
     inside = np.zeros(len(points), bool)
     inside[point[tiles]] = True
     others = np.flatnonzero(~tiles & ~inside[point] & graph.inhabitable[cell])
-    others = others[graph.plans.hold(cell[others], points[point[others]], graph.cell_count)]
+    if len(others):
+        others = others[graph.plans.hold(cell[others], points[point[others]], graph.cell_count)]
     kept = np.sort(np.concatenate([np.flatnonzero(tiles), others]))
     return starts_of(np.bincount(point[kept], minlength=len(points))), cell[kept].astype(np.int32)
 

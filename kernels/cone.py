@@ -161,15 +161,6 @@ def side_of(graph: DeviceGraph, entry: wp.vec4i, eye: wp.vec3d) -> int:
 
 
 @wp.func
-def in_flat_box(lo: wp.vec3d, hi: wp.vec3d) -> bool:
-    """Whether a closed box holds the eye."""
-    for i in range(3):
-        if lo[i] > f64(0.0) or hi[i] < f64(0.0):
-            return False
-    return True
-
-
-@wp.func
 def edge_on(work: wp.array[f64], cone: int, planes: int, axis: int, narrow: int) -> int:
     """The part of a cone in the plane through the eye across an axis: as much as rays along a portal can leave by."""
     count = wp.min(planes, PLANES - 2)
@@ -206,15 +197,11 @@ def narrow_cone(
         lo[i] = f64(graph.portal_lo[entry[0]][i]) - eye[i]
         hi[i] = f64(graph.portal_hi[entry[0]][i]) - eye[i]
         reach[i] = wp.max(wp.abs(lo[i]), wp.abs(hi[i]))
-    if side == 0 and in_flat_box(lo, hi):
-        # From within a portal both its cells are seen whole.
-        for k in range(3 * planes):
-            work[narrow + k] = work[cone + k]
-        return planes
     left = portal_in_cone(work, cone, planes, lo, hi, axis, spare, slack)
     if left[0] < 1 or (side > 0 and left[0] < 3):
         return -1
     if side == 0:
+        # An eye within the portal is in both its cells, and looks from both.
         return edge_on(work, cone, planes, axis, narrow)
     turn = f64(1.0)
     if (entry[3] & 1) == 0:

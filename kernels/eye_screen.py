@@ -6,7 +6,7 @@ rectangles of all sequences that reach a cell are merged.
 
 import warp as wp
 
-from .cone import CONE_SIZE, POLYGON_SIZE, SWAY, get, in_flat_box, norm_bound, portal_in_cone, screen_cone, side_of
+from .cone import CONE_SIZE, POLYGON_SIZE, SWAY, get, norm_bound, portal_in_cone, screen_cone, side_of
 from .eye_marks import Eyes, EyeScene, Marks, axes_of, eye_of, has, mark_contents
 from .graph import DeviceGraph
 from .launch import Scratch
@@ -32,8 +32,6 @@ def on_screen(
         lo[i] = f64(graph.portal_lo[portal][i]) - eye[i]
         hi[i] = f64(graph.portal_hi[portal][i]) - eye[i]
         reach[i] = wp.max(wp.abs(lo[i]), wp.abs(hi[i]))
-    if in_flat_box(lo, hi):
-        return frame
     left = portal_in_cone(work, base, planes, lo, hi, axis, base + CONE_SIZE, slack)
     out = wp.vec4d(f64(1.0e300), f64(1.0e300), -f64(1.0e300), -f64(1.0e300))
     loose = slack + SWAY * norm_bound(reach)

@@ -137,6 +137,15 @@ def test_sets_of_whole_buildings_take_nothing_away():
     assert sets(free) == sets(bound) and sum(map(len, sets(free)))
 
 
+@pytest.mark.parametrize("limit", [0, 2000])
+@pytest.mark.parametrize(("x", "yaw"), [(100, 0.0), (2900, 180.0)])
+def test_only_what_a_cell_holds_of_a_box_is_seen_in_it(x, yaw, limit):
+    """In the middle room it is beside the cone, and where the cone would be wide enough the next portal cuts it."""
+    graph = row_of_rooms((-500, 500, -500, 500), (-500, 500, -500, 500))
+    boxes = [[[10, 1200, 0], [2990, 1210, 9]], [[10, 1000, 0], [2990, 1210, 9]]]
+    assert seen(graph, boxes, camera([x, 0, 0], yaw), Screen(100, 100, 60.0), limit=limit) == [{1}]
+
+
 def test_near_portals_fill_the_screen():
     """A wide portal that begins beside the eye: a corner of it is hardly before the eye at all."""
     graph = row_of_rooms((-500, 500, -500, 500))
@@ -193,15 +202,16 @@ def test_without_portals_the_set_cut_by_the_screen():
 
 def test_walls_that_touch_and_eyes_between_cells():
     graph = row_of_rooms((-500, 500, -500, 500))
-    # Flat on the far wall, flat in the portal's wall, nowhere, behind the eye.
+    # Flat on the far wall, flat in the portal's wall, nowhere, and behind the eye, narrow and wide.
     boxes = [
         [[2000, -100, -100], [2000, 100, 100]],
         [[1000, 600, 0], [1000, 700, 9]],
         [[1500, 0, 0], [1400, 9, 9]],
         [[-500, 0, 0], [-400, 9, 9]],
+        [[-500, -900, -900], [-400, 900, 900]],
     ]
     assert seen(graph, boxes, camera([[0, 0, 0], [1000, 900, 0], [1000, 0, 0]], 0)) == [{0, 1}, {0}, {0}]
-    assert seen(graph, boxes, camera([[0, 0, 0]], 180)) == [{3}]
+    assert seen(graph, boxes, camera([[0, 0, 0]], 180)) == [{3, 4}]
 
 
 def test_threads_and_lots_change_nothing(monkeypatch):
