@@ -16,6 +16,7 @@ TWINS = {
     "launch_aim": ("aim", "exact.sightline.Sightlines", "kernels/test_aim.py"),
     "launch_clip": ("clip", "exact.clip.clipped", "kernels/test_clip.py"),
     "launch_trace": ("trace", "exact.trace.portal_path", "kernels/test_trace.py"),
+    "launch_eye": ("eye", "exact.eye.seen_by_eye", "kernels/test_eye.py"),
     "launch_shaft": ("shaft", "exact.umbra.hides", "kernels/test_shaft.py"),
     "launch_coverage": ("coverage", "exact.coverage.cover_polygon", "kernels/test_coverage.py"),
     "launch_backface": ("backface", "exact.backface.back_facing", "kernels/test_backface.py"),

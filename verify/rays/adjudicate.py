@@ -64,7 +64,7 @@ class Judge:
         if self.lines is not None and not self.lines.outside_solids(origin[None])[0]:
             return Judgement.BLOCKED
         found = (
-            self._sees_object(target, origin, end) if kind == "object" else self._sees_cell(cell, target, origin, end)
+            self.sees_object(target, origin, end) if kind == "object" else self._sees_cell(cell, target, origin, end)
         )
         if found is Judgement.VISIBLE and meets_flat_box(origin, end, self.cracks):
             return Judgement.LEAK
@@ -117,7 +117,7 @@ class Judge:
         passed = passes_portals(line, self.graph, np.ones(1, bool))[0]
         return (Judgement.BLOCKED, Judgement.GRAZE, Judgement.VISIBLE)[passed + 1]
 
-    def _sees_object(self, target: int, origin: np.ndarray, end: np.ndarray) -> Judgement:
+    def sees_object(self, target: int, origin: np.ndarray, end: np.ndarray) -> Judgement:
         """The object's first proper crossing must come before anything else opaque."""
         times: dict[bool, list] = {True: [], False: []}
         for triangles, opaque in ((self.lines, True), (self.glass, False)):

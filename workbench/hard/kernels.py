@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from ...kernels.launch import Device
 from ...verify.cases.hard_cases import HardCases
-from . import bakes, meshes, orders, searches, shadows
+from . import bakes, looks, meshes, orders, searches, shadows
 from .outcomes import Outcomes
 
 KERNELS: dict[str, Callable[[HardCases, Device], Outcomes]] = {
@@ -13,6 +13,7 @@ KERNELS: dict[str, Callable[[HardCases, Device], Outcomes]] = {
     "launch_target_search": searches.target_search,
     "launch_line_trees": searches.line_trees,
     "launch_trace": searches.trace,
+    "launch_eye": looks.eye,
     "launch_confirm": searches.confirm,
     "launch_aim": searches.aim,
     "launch_shaft": shadows.shaft,

@@ -28,7 +28,7 @@ from viewcell.verify.exact.tour import as_columns, least_runs
 from viewcell.verify.exact.trace import portal_links, portal_path
 from viewcell.workbench.bake.settings import METHODS
 from viewcell.workbench.cli import main
-from viewcell.workbench.hard import bakes, meshes, orders, searches, shadows
+from viewcell.workbench.hard import bakes, looks, meshes, orders, searches, shadows
 from viewcell.workbench.hard import run as hard_cases
 from viewcell.workbench.hard.bakes import write_model
 from viewcell.workbench.hard.kernels import KERNELS
@@ -271,6 +271,7 @@ BROKEN = {
     "launch_target_search": ("launch_target_search", hide_all),
     "launch_line_trees": ("launch_line_trees", lambda trees: replace(trees, words=trees.words - 1)),
     "launch_trace": ("launch_trace", lambda found: (np.zeros_like(found[0]), *found[1:])),
+    "launch_eye": ("launch_eye", lambda found: replace(found, objects=found.objects[:0], starts=found.starts * 0)),
     "launch_confirm": ("launch_confirm", np.ones_like),
     "launch_aim": ("launch_aim", lambda found: (np.ones_like(found[0]), *found[1:])),
     "launch_shaft": ("launch_shaft", hide_all),
@@ -296,7 +297,7 @@ BROKEN = {
 
 def spoil_all(monkeypatch, name, spoil):
     """Spoil what a kernel says wherever the hard cases ask it."""
-    for module in (bakes, meshes, orders, searches, shadows):
+    for module in (bakes, looks, meshes, orders, searches, shadows):
         if launch := getattr(module, name, None):
             monkeypatch.setattr(module, name, lambda *work, launch=launch, **options: spoil(launch(*work, **options)))
 
