@@ -38,7 +38,7 @@ def tour_cases(n: int, device: Device) -> list[Case]:
             n=n,
             work=lambda: tour_order(sets.starts, sets.members, places, device),
             judge=partial(judge_order, sets),
-            baseline="sampled, as published",
+            baseline="sampled tour",
             reference=lambda: sampled_order(sets),
             share=1.0,
             modules=[tour_kernels.__name__],
