@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .graph import OTHER_AXES, CellGraph
+from .graph import OTHER_AXES, CellGraph, flat_boxes
 from .opaque import NO_PLANES, OpaquePlanes
 from .rasters import Rasters
 
@@ -57,11 +57,7 @@ def find_blockers(graph: CellGraph, opaque: OpaquePlanes | None = None) -> Block
             planes.append(k)
     axes, planes = np.array(axes, np.int32), np.array(planes, np.int32)
     plane, rectangles = _largest(lots)
-    boxes = np.repeat(planes[plane, None], 6, axis=1).reshape(-1, 2, 3)
-    for axis in range(3):
-        mine = np.flatnonzero(axes[plane] == axis)
-        boxes[np.ix_(mine, [0, 1], OTHER_AXES[axis])] = rectangles[mine]
-    return Blockers(boxes, axes[plane])
+    return Blockers(flat_boxes(rectangles, axes[plane], planes[plane]), axes[plane])
 
 
 def _on_plane(

@@ -13,7 +13,7 @@ def contents(cells: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarr
     """Boxes that touch each cell; a wall between two cells belongs to both.
 
     Args:
-        cells: shape (n, 2, 3), int.
+        cells: shape (n, 2, 3), int; one with low above high touches nothing.
         boxes: low and high corners, shape (m, 2, 3), int; low above high for one that is nowhere.
 
     Returns:

@@ -12,17 +12,17 @@ with its halves, their halves, and so on. Source of the idea of occluders at any
 
 from collections.abc import Iterator
 from fractions import Fraction
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 
 from .blockers import Blockers
 from .outlines import outline, tiles
 from .progress import track
-from .ragged import places_of, starts_of
+from .ragged import lots, places_of, starts_of
 from .scene import turned
 from .sections import largest_sections, over
-from .shapes import shape_key
+from .shapes import copies, first_alike
 from .solids import winds_around
 
 # `Blockers.axis` of a curtain from the corner of its plan box with the least x and y to the opposite one, and of one
@@ -76,16 +76,11 @@ def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float) 
 
 def _alike(elements: list[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """The first element of each shape, and how far it is to each of that shape, (n, 3), itself first."""
-    known: dict[bytes, int] = {}
-    firsts: list[np.ndarray] = []
-    corners: list[list[np.ndarray]] = []
-    for triangles in elements:
-        number = known.setdefault(shape_key(triangles), len(firsts))
-        if number == len(firsts):
-            firsts.append(triangles)
-            corners.append([])
-        corners[number].append(triangles.min(axis=(0, 1)))
-    return firsts, [np.array(own) - own[0] for own in corners]
+    starts = starts_of([len(triangles) for triangles in elements])
+    every = np.concatenate([np.zeros((0, 3, 3), np.int32), *elements])
+    groups = list(copies(starts, first_alike(every, starts)))
+    corners = np.array([triangles.min(axis=(0, 1)) for triangles in elements])
+    return [elements[first] for first, _ in groups], [corners[own] - corners[first] for first, own in groups]
 
 
 def _copied(quads: np.ndarray, owner: np.ndarray, shifts: list[np.ndarray]) -> np.ndarray:
@@ -98,9 +93,7 @@ def _copied(quads: np.ndarray, owner: np.ndarray, shifts: list[np.ndarray]) -> n
 
 def lots_of(elements: list[np.ndarray]) -> list[list[np.ndarray]]:
     """Elements in lots of about TRIANGLES triangles, which are cut together."""
-    total = np.cumsum([len(triangles) for triangles in elements], dtype=np.int64)
-    ends = np.flatnonzero(np.diff(total // TRIANGLES)) + 1
-    return [elements[a:b] for a, b in pairwise([0, *ends.tolist(), len(elements)]) if a < b]
+    return [elements[first:stop] for first, stop in lots([len(triangles) for triangles in elements], TRIANGLES)]
 
 
 def _add(boxes: list[np.ndarray], kinds: list[np.ndarray], quads: np.ndarray) -> None:
@@ -236,8 +229,7 @@ def _pairs(
     sizes = np.array([len(triangles) for triangles in elements], np.int64)
     starts = starts_of(sizes)
     every = np.concatenate([np.zeros((0, 3, 3), np.int32), *elements])
-    total = np.cumsum(sizes[owner])
-    for first, stop in pairwise([0, *(np.flatnonzero(np.diff(total // PAIRS)) + 1).tolist(), len(quads)]):
+    for first, stop in lots(sizes[owner], PAIRS):
         mine = owner[first:stop]
         row = np.repeat(np.arange(stop - first), sizes[mine])
         yield slice(first, stop), row, every[places_of(starts[mine], sizes[mine])]

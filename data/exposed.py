@@ -73,12 +73,12 @@ def exposed_faces(closed: list[tuple[int, np.ndarray]]) -> dict[int, list[Uprigh
         bands = [bands for other in against[place] if (bands := whole[other]) is not None]
         return bool(bands) and whole.get(place) is not None and _fills(bands, faces[place][1])
 
-    exposed = {}
-    places = iter(range(len(faces)))
-    for object_id, own in found.items():
-        hidden = [covered(next(places)) for _ in own]
-        if any(hidden):
-            exposed[object_id] = [face for face, gone in zip(own, hidden, strict=True) if not gone]
+    gone = [covered(place) for place in range(len(faces))]
+    touched = {object_id for (object_id, _), hidden in zip(faces, gone, strict=True) if hidden}
+    exposed: dict[int, list[UprightFace]] = {object_id: [] for object_id in found if object_id in touched}
+    for (object_id, face), hidden in zip(faces, gone, strict=True):
+        if object_id in touched and not hidden:
+            exposed[object_id].append(face)
     return exposed
 
 

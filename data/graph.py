@@ -12,6 +12,23 @@ from .plans import NO_PLANS, Plans
 OTHER_AXES = np.array([[1, 2], [0, 2], [0, 1]])
 
 
+def flat_boxes(rectangles: np.ndarray, axes: int | np.ndarray, planes: np.ndarray) -> np.ndarray:
+    """Rectangles of axial planes as boxes without thickness.
+
+    Args:
+        rectangles: low and high corners (u, v), shape (n, 2, 2).
+        axes: perpendicular to their planes: one for all, or shape (n,).
+        planes: coordinate of each plane, shape (n,).
+
+    Returns:
+        Shape (n, 2, 3), of the dtype of `planes`.
+    """
+    boxes = np.repeat(planes, 6).reshape(-1, 2, 3)
+    uv = np.broadcast_to(OTHER_AXES[axes].reshape(-1, 1, 2), rectangles.shape)
+    np.put_along_axis(boxes, uv, rectangles, axis=2)
+    return boxes
+
+
 @dataclass
 class CellGraph:
     """Cells, portals and the opaque rest of the cells' faces, all in grid steps.

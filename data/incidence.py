@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .ragged import places_of
+from .contents import contents
+from .ragged import owners_of, places_of
 from .scene import Scene
 
 CHUNK = 200_000
@@ -63,21 +64,11 @@ def populate(scene: Scene, cells: np.ndarray, clip: Callable[..., np.ndarray] = 
     """
     triangles, starts = scene.triangles()[0], scene.triangle_starts
     bounds = scene.object_bounds()
-    cell, object_id, whole = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0, bool)]
-    present = np.flatnonzero(np.diff(starts))
-    step = max(1, CHUNK // max(1, len(cells)))
-    for first in range(0, len(present), step):
-        own = present[first : first + step]
-        low, high = bounds[own].transpose(1, 0, 2)
-        near = np.ones((len(own), len(cells)), bool)
-        for axis in range(3):
-            near &= (cells[:, 0, axis] <= high[:, axis, None]) & (cells[:, 1, axis] >= low[:, axis, None])
-        row, found = np.nonzero(near)
-        inside = (cells[found, 0] <= low[row]).all(axis=1) & (cells[found, 1] >= high[row]).all(axis=1)
-        cell.append(found)
-        object_id.append(own[row])
-        whole.append(inside & (near.sum(axis=1)[row] == 1))
-    rows, objects, within = (np.concatenate(column) for column in (cell, object_id, whole))
+    near, rows = contents(bounds, cells)
+    objects = owners_of(near)
+    low, high = bounds[objects].transpose(1, 0, 2)
+    within = (cells[rows, 0] <= low).all(axis=1) & (cells[rows, 1] >= high).all(axis=1)
+    within &= np.diff(near)[objects] == 1
     boxes = bounds[objects]
     own = objects[~within]
     boxes[~within] = clip(triangles, np.column_stack([starts[own], starts[own + 1]]), cells[rows[~within]])

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .graph import OTHER_AXES
+from .graph import OTHER_AXES, flat_boxes
 from .outlines import OBLIQUE_STEPS, Covered, Outlines, cover, outline
 
 
@@ -94,11 +94,9 @@ def carved_planes(triangles: np.ndarray, carve_area: float) -> tuple[OpaquePlane
     detailed &= planes[:, 0] < 2
     if not detailed.any():
         return plain, plain
-    other, carved, lost = _covered(
-        cover(outlines.only(detailed), carve=np.full(detailed.sum(), carve_area)), len(planes)
-    )
     numbers = np.flatnonzero(detailed)
-    areas[numbers] = lost[: len(numbers)]
+    carve = np.full(len(numbers), carve_area)
+    other, carved, areas[numbers] = _covered(cover(outlines.only(detailed), carve=carve), len(numbers))
     keep = ~detailed[owner]
     owner, rectangles = np.concatenate([owner[keep], numbers[other]]), np.concatenate([rectangles[keep], carved])
     order = np.argsort(owner, kind="stable")
@@ -134,7 +132,5 @@ def _opaque(planes: np.ndarray, owner: np.ndarray, rectangles: np.ndarray, areas
     found = []
     for axis in range(3):
         mine = planes[owner, 0] == axis
-        boxes = np.repeat(planes[owner[mine], 1, None], 6, axis=1).reshape(-1, 2, 3).astype(np.int32)
-        boxes[:, :, OTHER_AXES[axis]] = rectangles[mine]
-        found.append(boxes)
+        found.append(flat_boxes(rectangles[mine], axis, planes[owner[mine], 1].astype(np.int32)))
     return OpaquePlanes(found, float(areas.sum()), float(areas[:, 1].sum()))

@@ -17,11 +17,11 @@ import numpy as np
 from .blockers import Blockers
 from .curtains import LEAST_M2, NEAR_DEG, THIN_M, cuts_inside, face_normals, inside, lots_of
 from .frame import LEAST_DEG
-from .graph import OTHER_AXES
+from .graph import flat_boxes
 from .occludees import Occludees, turned_occludees
 from .plans import Plans, box_corners, plan_bounds, turned_plan
 from .scene import GRID_LIMIT, OPAQUE, Scene, turned
-from .sections import Cut, largest_sections, over
+from .sections import Cut, largest_sections, over, reaching
 from .solids import winding_numbers
 
 # The box around a cell's plan in its frame is wider than the plan by no more than this on every side [grid steps].
@@ -161,7 +161,7 @@ def _walls(elements: list[np.ndarray], yaw: float, grid_m: float) -> Blockers:
         for axis in range(2):
             cut, found = largest_sections(along[axis], np.tile([ENDS, 0], (len(along[axis]), 1)), least)
             plane = np.array([section.plane for section in along[axis]], np.int64)[cut]
-            found = _flat_boxes(found, axis, plane)
+            found = flat_boxes(found, axis, plane)
             owner = np.array(owners[axis], np.int64)[cut]
             boxes.append(found[inside(turned(found.astype(float), yaw), owner, lot, CLEAR_STEPS)])
             axes.append(np.full(len(boxes[-1]), axis))
@@ -169,13 +169,6 @@ def _walls(elements: list[np.ndarray], yaw: float, grid_m: float) -> Blockers:
         axes.append(np.full(len(boxes[-1]), 2))
     joined = np.concatenate(boxes).astype(np.int32)
     return Blockers(joined, np.concatenate(axes).astype(np.int32))
-
-
-def _flat_boxes(rectangles: np.ndarray, axis: int, planes: np.ndarray) -> np.ndarray:
-    """Rectangles (n, 2, 2) of planes as flat boxes, shape (n, 2, 3), int64."""
-    boxes = np.repeat(planes[:, None], 6, axis=1).reshape(-1, 2, 3)
-    boxes[:, :, OTHER_AXES[axis]] = rectangles
-    return boxes
 
 
 def _faces_along(flat: np.ndarray, least: float) -> list[np.ndarray]:
@@ -201,7 +194,7 @@ def _levels(flat: np.ndarray, level: np.ndarray) -> list[Cut]:
     found = []
     for below, heights in ((True, high), (False, low)):
         for k in np.unique(heights[low == high]).tolist():
-            cut = (low < k) & (high >= k) if below else (low <= k) & (high > k)
+            cut = reaching(level, 2, k, below=below)
             if upright[cut].all():
                 found.append(Cut(level[cut], 2, k, below))
     return found
@@ -221,9 +214,8 @@ def _level_boxes(cuts: list[Cut], flats: list[np.ndarray], least: float) -> np.n
         section, flat = cuts[number], flats[number]
         mine, below = rectangles[cut == number], section.below
         # The sides stand over plan boxes; none comes near the inside of a rectangle.
-        low, high = flat[:, :, 2].min(axis=1), flat[:, :, 2].max(axis=1)
         k = section.plane
-        sides = flat[(low < k) & (high >= k) if below else (low <= k) & (high > k)][:, :, :2]
+        sides = flat[reaching(flat, 2, k, below=below)][:, :, :2]
         sides = np.stack([sides.min(axis=1), sides.max(axis=1)], axis=1)
         near = (sides[None, :, 0] < mine[:, None, 1] + CLEAR_STEPS) & (
             sides[None, :, 1] > mine[:, None, 0] - CLEAR_STEPS
@@ -231,5 +223,5 @@ def _level_boxes(cuts: list[Cut], flats: list[np.ndarray], least: float) -> np.n
         mine = mine[~near.all(axis=2).any(axis=1)]
         middles = np.column_stack([mine.mean(axis=1), np.full(len(mine), k - 0.5 if below else k + 0.5)])
         mine = mine[np.abs(winding_numbers(middles, flat)) > 0.5]
-        found.append(_flat_boxes(mine, 2, np.full(len(mine), k)))
+        found.append(flat_boxes(mine, 2, np.full(len(mine), k)))
     return np.concatenate(found)

@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from .graph import OTHER_AXES, CellGraph
+from .graph import OTHER_AXES, CellGraph, flat_boxes
 from .opaque import OpaquePlanes
-from .ragged import places_of
+from .ragged import lots, places_of
 from .rasters import Rasters
 
 # Pairs of cells that are looked at together.
@@ -33,11 +33,9 @@ def find_portals(cells: np.ndarray, opaque: OpaquePlanes) -> CellGraph:
         pairs, faces = shared_faces(cells, axis)
         planes = cells[pairs[:, 0], 1, axis]
         face, rectangles = open_rectangles(faces, planes, lambda k, axis=axis: index.rectangles(axis, k))
-        flat = np.repeat(planes[face, None], 6, axis=1).reshape(-1, 2, 3)
-        flat[:, :, OTHER_AXES[axis]] = rectangles
         ends.append(pairs[face])
         axes.append(np.full(len(face), axis))
-        boxes.append(flat)
+        boxes.append(flat_boxes(rectangles, axis, planes[face]))
     return CellGraph(
         cells,
         np.zeros(len(cells), bool),
@@ -60,10 +58,9 @@ def shared_faces(cells: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
     begin, end = (np.searchsorted(cells[by_low, 0, axis], cells[below, 1, axis], side) for side in ("left", "right"))
     pairs, faces = [np.zeros((0, 2), np.int64)], [np.zeros((0, 2, 2), np.int64)]
     # Cells of one storey make many pairs that touch in one plane, far apart.
-    total = np.cumsum(end - begin)
-    for lot in np.split(np.arange(len(below)), np.flatnonzero(np.diff(total // PAIRS)) + 1):
-        times = (end - begin)[lot]
-        low, high = np.repeat(below[lot], times), by_low[places_of(begin[lot], times)]
+    for first, stop in lots(end - begin, PAIRS):
+        times = (end - begin)[first:stop]
+        low, high = np.repeat(below[first:stop], times), by_low[places_of(begin[first:stop], times)]
         corner_low = np.maximum(cells[low, 0], cells[high, 0])[:, uv]
         corner_high = np.minimum(cells[low, 1], cells[high, 1])[:, uv]
         touch = (corner_high > corner_low).all(axis=1)

@@ -1,5 +1,7 @@
 """Ragged arrays: lists of different lengths in one array; list i is values[starts[i]:starts[i + 1]]."""
 
+from itertools import pairwise
+
 import numpy as np
 
 
@@ -20,6 +22,13 @@ def places_of(firsts: np.ndarray | int, sizes: np.ndarray) -> np.ndarray:
     ends = np.cumsum(sizes)
     total = int(ends[-1]) if len(ends) else 0
     return np.arange(total) + np.repeat(firsts - (ends - sizes), sizes)
+
+
+def lots(sizes: np.ndarray | list[int], most: int) -> list[tuple[int, int]]:
+    """First and past-the-last of consecutive lists that hold about so many values together."""
+    total = np.cumsum(sizes, dtype=np.int64)
+    ends = [0, *(np.flatnonzero(np.diff(total // most)) + 1).tolist(), len(total)]
+    return [(first, stop) for first, stop in pairwise(ends) if first < stop]
 
 
 def take_lists(starts: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

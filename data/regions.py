@@ -14,11 +14,11 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from .blockers import Blockers
-from .graph import OTHER_AXES
+from .graph import OTHER_AXES, flat_boxes
 from .opaque import OpaquePlanes
 from .ragged import places_of, starts_of
 from .rasters import Rasters
-from .sections import Cut, section_rectangles
+from .sections import Cut, reaching, section_rectangles
 
 # Regions and pieces of furniture below this hide little and would fill the hierarchy.
 LEAST_M2 = 0.5
@@ -166,10 +166,7 @@ def _regions(axis: np.ndarray, plane: np.ndarray, rasters: Rasters, covered: np.
     cells = np.flatnonzero(rasters.area > 0)
     before[cells + rasters.sizes[1][rasters.owner[cells]] + 1] = opened[cells]
     region, rectangles = rasters.maximal(covered, covered)
-    boxes = np.repeat(plane[region, None], 6, axis=1).reshape(-1, 2, 3)
-    for k in range(3):
-        mine = np.flatnonzero(axis[region] == k)
-        boxes[np.ix_(mine, [0, 1], OTHER_AXES[k])] = rectangles[mine]
+    boxes = flat_boxes(rectangles, axis[region], plane[region])
     places = np.stack([*rasters.starts, rasters.nodes], axis=1)
     u, v = (at.astype(np.int32) for at in rasters.coordinates)
     return Regions(axis, plane, places, u, v, before, boxes, region.astype(np.int32))
@@ -267,8 +264,7 @@ class _Sections:
         below, above = places[planes[places] > heights[0]], places[planes[places] < heights[-1]]
         uppers = np.searchsorted(heights, planes[below]), np.searchsorted(heights, planes[above], "right")
         for upper in np.unique(np.concatenate(uppers)).tolist():
-            over = triangles[:, :, axis] >= heights[upper]
-            cut = triangles[over.any(axis=1) & ~over.all(axis=1)]
+            cut = triangles[reaching(triangles, axis, heights[upper])]
             if len(cut) > SECTION_TRIANGLES:
                 continue
             sides = below[uppers[0] == upper], above[uppers[1] == upper]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .graph import OTHER_AXES
-from .outlines import Covered, Outlines, cover
+from .outlines import Outlines, cover, tiles
 
 # Steps of the staircase along an oblique outline of a section.
 SECTION_STEPS = 4
@@ -41,12 +41,7 @@ def section_rectangles(cuts: Sequence[Cut]) -> tuple[np.ndarray, np.ndarray]:
     Returns:
         Section of each, ascending, shape (n,), and corners in u and v, shape (n, 2, 2), int64.
     """
-    owners, found = [np.zeros(0, np.int64)], [np.zeros((0, 2, 2), np.int64)]
-    for part in _covered(cuts):
-        owner, rectangles = part.rasters.tile(part.kept)
-        owners.append(owner + part.first)
-        found.append(rectangles.astype(np.int64))
-    return np.concatenate(owners), np.concatenate(found)
+    return tiles(_outlines(cuts), _steps(cuts), anywhere=True)
 
 
 def largest_sections(cuts: Sequence[Cut], ends: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
@@ -61,7 +56,7 @@ def largest_sections(cuts: Sequence[Cut], ends: np.ndarray, least: float) -> tup
         As `section_rectangles`.
     """
     owners, found = [np.zeros(0, np.int64)], [np.zeros((0, 2, 2), np.int64)]
-    for part in _covered(cuts):
+    for part in cover(_outlines(cuts), _steps(cuts), anywhere=True):
         # What is no larger in all holds no such rectangle: most sections of furniture are frames of thin boards.
         large = part.areas(part.kept) >= least
         wanted = part.kept & large[part.rasters.owner]
@@ -75,18 +70,17 @@ def largest_sections(cuts: Sequence[Cut], ends: np.ndarray, least: float) -> tup
     return np.concatenate(owners), np.concatenate(found)
 
 
-def _covered(cuts: Sequence[Cut]) -> Sequence[Covered]:
-    if not cuts:
-        return ()
-    steps = np.array([LEVEL_STEPS if cut.axis == 2 else SECTION_STEPS for cut in cuts])
-    return cover(_outlines(cuts), steps, anywhere=True)
+def _steps(cuts: Sequence[Cut]) -> np.ndarray:
+    """Steps along oblique edges of each section, int."""
+    return np.array([LEVEL_STEPS if cut.axis == 2 else SECTION_STEPS for cut in cuts], int)
 
 
 def _outlines(cuts: Sequence[Cut]) -> Outlines:
     """Outlines of sections."""
     owner = np.repeat(np.arange(len(cuts)), [len(cut.triangles) for cut in cuts])
     # The height first, then u and v.
-    turned = np.concatenate([cut.triangles[:, :, [cut.axis, *OTHER_AXES[cut.axis]]] for cut in cuts]).astype(np.int64)
+    turned = [cut.triangles[:, :, [cut.axis, *OTHER_AXES[cut.axis]]] for cut in cuts]
+    turned = np.concatenate([np.zeros((0, 3, 3), np.int64), *turned]).astype(np.int64)
     plane = np.array([cut.plane for cut in cuts], np.int64)[owner]
     below = np.array([cut.below for cut in cuts], bool)[owner]
     heights, flat = turned[:, :, 0], turned[:, :, 1:]
@@ -117,6 +111,11 @@ def _outlines(cuts: Sequence[Cut]) -> Outlines:
 
 def over(triangles: np.ndarray, axis: int, plane: int, *, below: bool = True) -> Cut:
     """The section of a closed surface by a plane, with the triangles that reach over it."""
+    return Cut(triangles[reaching(triangles, axis, plane, below=below)], axis, plane, below)
+
+
+def reaching(triangles: np.ndarray, axis: int, plane: int, *, below: bool = True) -> np.ndarray:
+    """Triangles, shape (m, 3, 3), that a section just below or just above a plane cuts, shape (m,), bool."""
     heights = triangles[:, :, axis]
     above = heights >= plane if below else heights > plane
-    return Cut(triangles[above.any(axis=1) & ~above.all(axis=1)], axis, plane, below)
+    return above.any(axis=1) & ~above.all(axis=1)

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from .graph import flat_boxes
 from .opaque import OpaquePlanes
 from .sections import over, section_rectangles
 
@@ -83,7 +84,5 @@ def _section(triangles: np.ndarray, axis: int, plane: int, least: float) -> np.n
     """Flat boxes inside the section of an element, shape (n, 2, 3), int32; none if it is small."""
     _, rectangles = section_rectangles([over(triangles, axis, plane)])
     area = (rectangles[:, 1] - rectangles[:, 0]).prod(axis=1).sum()
-    boxes = np.full((len(rectangles), 2, 3), plane, np.int32)
-    others = [other for other in range(3) if other != axis]
-    boxes[:, :, others] = rectangles
+    boxes = flat_boxes(rectangles, axis, np.full(len(rectangles), plane, np.int32))
     return boxes if area >= least else boxes[:0]

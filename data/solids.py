@@ -3,11 +3,9 @@
 Only closed elements count, each alone: an open ceiling would make everything under it "inside".
 """
 
-from itertools import pairwise
-
 import numpy as np
 
-from .ragged import places_of, starts_of
+from .ragged import lots, places_of, starts_of
 from .scene import GRID_LIMIT, OPAQUE, Role, Scene
 
 SHIFT = 2 * GRID_LIMIT
@@ -191,8 +189,8 @@ class SolidIndex:
         """
         rows, solids = self._boxed(points, np.broadcast_to(cell, len(points)))
         sizes = np.diff(self._starts)[solids]
-        free, total = np.ones(len(points), bool), np.cumsum(sizes)
-        for first, stop in pairwise([0, *(np.flatnonzero(np.diff(total // PAIRS)) + 1).tolist(), len(rows)]):
+        free = np.ones(len(points), bool)
+        for first, stop in lots(sizes, PAIRS):
             row = np.repeat(np.arange(stop - first), sizes[first:stop])
             triangles = self._triangles[places_of(self._starts[solids[first:stop]], sizes[first:stop])]
             within = np.abs(_windings(points[rows[first:stop]], row, triangles)) >= 1e-3
