@@ -54,11 +54,13 @@ class Phase:
         total: units in all; None where it is not known.
         unit: what is counted, in the singular; "" where nothing is.
         done: units done.
+        under_way: units done of what is begun beside that and not over, as far as can be guessed.
         note: what else there is to say.
     """
 
     def __init__(self, name: str, total: float | None = None, unit: str = "") -> None:
-        self.name, self.total, self.unit, self.done, self.note = name, total, unit, 0.0, ""
+        self.name, self.total, self.unit, self.note = name, total, unit, ""
+        self.done = self.under_way = 0.0
         self._started = self._said = time.perf_counter()
         # What phases within this one take is not what its own units take: the first unit often prepares for all.
         self._within = 0.0
@@ -76,7 +78,8 @@ class Phase:
         """Seconds that it should still take, as its own units took; None where that cannot be said."""
         if not self.total or not 0 < self.done:
             return None
-        return max(0.0, self.seconds - self._within) / self.done * max(0.0, self.total - self.done)
+        so_far = self.done + self.under_way
+        return max(0.0, self.seconds - self._within) / so_far * max(0.0, self.total - so_far)
 
     def update(self, more: float = 1) -> None:
         """Count units as done."""

@@ -63,6 +63,17 @@ def test_what_is_done_once_within_a_phase_does_not_lengthen_the_rest(clock, line
     assert lines(logging.INFO)[0] == "visibility: 1 of 10 cells in 52.0 s, about 18 s left"
 
 
+def test_what_others_are_at_counts_as_begun(clock):
+    with phase("visibility", 12, "cell") as bar:
+        clock.now += 6
+        bar.under_way = 1
+        bar.update(2)
+        assert bar.left_s == 18
+        bar.under_way = 0
+        bar.update(2)
+        assert bar.left_s == 12
+
+
 def test_nothing_known_nothing_said(clock):
     assert Phase("read").left_s is None and Phase("read", 5, "file").left_s is None
     more = Phase("cells", 1, "cell")
