@@ -212,14 +212,9 @@ def _write(sources: Sources, scene: Scene | None, settings: Settings, run: _Run,
         clock.show("leaks")
         extra |= _leaks(sources, (cell_rows, object_rows), settings, run)
         clock.lap("leaks")
-    if sources.model is not None and short is None:
-        clock.show("back faces")
-        facts["counts"] = facts["counts"] | _triangle_counts(sources.model, graph, object_rows, run.device)
-        clock.lap("back faces")
-    pairs = object_rows.source, object_rows.target
-    clock.show("eyes")
-    facts |= worth(sources.model, graph, pairs, facts, settings.seed)
-    clock.lap("eyes")
+    clock.show("eyes, back faces")
+    facts |= _worth(sources, object_rows, settings.seed, run.device, back_faces=short is None)
+    clock.lap("eyes, back faces")
     if scene is not None and settings.lods:
         extra["cell_lods"] = _cell_lods(sources.model.scene, graph, object_rows, settings)
         clock.lap("levels of detail")
@@ -320,6 +315,20 @@ def _visibility(
         clock.lap("certificates")
     # Where time ran out, most is unknown, and sharing would take as long again.
     return *work.engine.join(parts, share=short is None), tables, short
+
+
+def _worth(sources: Sources, rows: Rows, seed: int, device: "Device", back_faces: bool) -> dict:
+    """What the manifest says of a bake's worth, and its counts, with triangles: side by side, as each is one thread."""
+    from ...kernels.launch import side_by_side
+
+    graph, facts, model = sources.graph, sources.facts, sources.model
+    work = [lambda: worth(model, graph, (rows.source, rows.target), facts, seed)]
+    if model is not None and back_faces:
+        work.append(lambda: {"counts": facts["counts"] | _triangle_counts(model, graph, rows, device)})
+    found = {}
+    for _, part in sorted(side_by_side(lambda do: do(), work, device)):
+        found |= part
+    return found
 
 
 def _triangle_counts(model: PreparedModel, graph: CellGraph, rows: Rows, device: "Device") -> dict[str, int]:
