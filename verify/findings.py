@@ -148,32 +148,41 @@ class VerifyResult:
         return "\n".join([*lines, *(["", *(f"refuted: {line}" for line in refuted)] if refuted else [])])
 
 
-def count_pairs(bake: "BakeFolder", caster: Caster | None = None) -> list[Counts]:
-    """Pairs by class of targets: inhabitable cells, other cells, objects; with what a caster's rays saw, if given."""
-    # Nothing is claimed of cells from, or to, view cells with a plan.
+def count_pairs(bake: "BakeFolder", by_rays: dict[str, int] | None = None) -> list[Counts]:
+    """Pairs by class of targets: inhabitable cells, other cells, objects; with what rays saw of each, if given."""
+    counts = []
+    for name, chosen in _classes(bake).items():
+        table, target, sets = bake.cell_to_cell, "reached_cell_id", bake.cell_sets
+        if chosen is None:
+            table, target, sets = bake.cell_to_object, "object_id", bake.object_sets
+        # Members alone: what a row holds as nothing is claimed of it counts as nothing.
+        potential, seen = (
+            len(ids) if chosen is None else int(chosen[ids].sum())
+            for ids in (sets.members, visible_rows(table)[target].to_numpy())
+        )
+        counts.append(Counts(name, potential, seen, (by_rays or {}).get(name, 0)))
+    return counts
+
+
+def pairs_by_rays(bake: "BakeFolder", caster: Caster) -> dict[str, int]:
+    """Potential pairs of each class that a caster's rays saw."""
+    found = {}
+    for name, chosen in _classes(bake).items():
+        if chosen is None:
+            found[name] = int(((caster.seen_objects > 0) & caster.potential_objects).sum())
+        else:
+            rows = caster.sources < bake.graph.tile_count
+            both = (caster.seen_cells[rows] > 0) & caster.potential_cells[rows]
+            found[name] = int(np.count_nonzero(both, axis=0)[chosen].sum())
+    return found
+
+
+def _classes(bake: "BakeFolder") -> dict[str, np.ndarray | None]:
+    """Which cells each class of targets has, shape (cells,), bool; None: objects.
+
+    Nothing is claimed of cells from, or to, view cells with a plan.
+    """
     tiles = np.arange(bake.graph.cell_count) < bake.graph.tile_count
     inhabitable = bake.graph.inhabitable & tiles
-    tables = (
-        []
-        if not bake.claims_cells
-        else [
-            (name, bake.potential_cells[tiles][:, chosen], bake.cell_to_cell, "reached_cell_id", chosen)
-            for name, chosen in (
-                ("cells, inhabitable", inhabitable),
-                ("cells, wall, sliver and exterior", ~inhabitable & tiles),
-            )
-        ]
-    )
-    tables.append(("objects", bake.potential_objects, bake.cell_to_object, "object_id", None))
-    counts = []
-    for name, potential, table, target, chosen in tables:
-        ids = visible_rows(table)[target].to_numpy()
-        seen = len(ids) if chosen is None else int(chosen[ids].sum())
-        by_rays = 0
-        if caster is not None:
-            marks = caster.seen_objects if target == "object_id" else caster.seen_cells
-            own = caster.potential_objects if target == "object_id" else caster.potential_cells
-            rows = slice(None) if chosen is None else tiles[caster.sources]
-            by_rays = int(((marks > 0) & own)[rows][:, slice(None) if chosen is None else chosen].sum())
-        counts.append(Counts(name, int(potential.sum()), seen, by_rays))
-    return counts
+    cells = {"cells, inhabitable": inhabitable, "cells, wall, sliver and exterior": ~inhabitable & tiles}
+    return (cells if bake.claims_cells else {}) | {"objects": None}

@@ -1,6 +1,7 @@
 """Check a bake: rays that must see nothing hidden, witnesses that must hold, and certificates if it has them."""
 
 import time
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from ..data.scene import OPAQUE, Role
 from ..verify.cases.case_file import WrongHidden, read_case, write_case
 from ..verify.exact.sightline import Sightlines
 from ..verify.exact.trace import contact_links, portal_links
-from ..verify.findings import VerifyResult, count_pairs
+from ..verify.findings import VerifyResult, count_pairs, pairs_by_rays
 from ..verify.proofs.line_tree import check_certificates, has_certificates
 from ..verify.rays.adjudicate import Judge, Judgement, sightline_end
 from ..verify.rays.embree import Candidates, Caster
@@ -24,6 +25,7 @@ from ..verify.rays.starts import ORIGINS_MOST, aim_points, cell_origins, frontie
 from ..verify.rays.witness import CHUNK, confirm_cells, confirm_objects, read_witnesses, visible_rows
 
 if TYPE_CHECKING:
+    from ..data.pair_sets import PairSets
     from ..data.store.bake_folder import BakeFolder
 
 BATCH_RAYS = 100_000
@@ -39,6 +41,8 @@ GUIDED = 4
 # Embree's own rate is taken so many times in a run.
 RATE_BLOCKS = 5
 KINDS = ("cell", "object")
+# Pairs of view cells and targets that are marked at a time, two bytes each.
+MARKS_MOST = 1 << 28
 
 
 def verify_bake(bake: "BakeFolder", *, rays: int = 1_000_000, seed: int = 0, progress: bool = False) -> VerifyResult:
@@ -60,15 +64,7 @@ def verify_bake(bake: "BakeFolder", *, rays: int = 1_000_000, seed: int = 0, pro
         raise InputError(f"rays: expected 0 or more, found {rays}")
     result, start = VerifyResult(), time.perf_counter()
     with shown(progress):
-        with phase("prepare"):
-            judge = make_judge(bake)
-            caster, dark = make_caster(bake, judge, (bake.potential_cells, bake.potential_objects), rays, seed)
-        result.dark_cells = len(dark)
-        result.seconds["prepare"] = time.perf_counter() - start
-        if rays and caster is not None:
-            _cast_all(bake, caster, judge, rays, result)
-            if bake.scene is not None and not result.wrong_hidden:
-                _hunt(bake, caster, judge, rays // GUIDED, result)
+        judge, by_rays = _cast_lots(bake, rays, seed, result)
         start = time.perf_counter()
         _confirm_all(bake, judge, result)
         result.seconds["witnesses"] = time.perf_counter() - start
@@ -77,8 +73,41 @@ def verify_bake(bake: "BakeFolder", *, rays: int = 1_000_000, seed: int = 0, pro
             with phase("certificates"):
                 result.certificates = check_certificates(bake)
             result.seconds["certificates"] = time.perf_counter() - start
-    result.counts = count_pairs(bake, caster if rays else None)
+    result.counts = count_pairs(bake, by_rays)
     return result
+
+
+def _cast_lots(bake: "BakeFolder", rays: int, seed: int, result: VerifyResult) -> tuple[Judge, dict[str, int]]:
+    """Cast from lots of the inhabitable cells, whose sets fit into memory as matrices, until one shows an omission.
+
+    Returns:
+        The judge, and potential pairs that rays saw, by class.
+    """
+    sources, start = np.flatnonzero(bake.graph.inhabitable), time.perf_counter()
+    with phase("prepare"):
+        judge = make_judge(bake)
+    result.seconds["prepare"] = time.perf_counter() - start
+    size = max(1, MARKS_MOST // max(1, bake.graph.cell_count + bake.object_sets.count))
+    caster, found, spent, timed = None, Counter(), 0.0, 0
+    for first in range(0, len(sources), size):
+        lot, start = sources[first : first + size], time.perf_counter()
+        share = -(-rays * len(lot) // len(sources))
+        claims = bake.cell_sets, bake.object_sets
+        caster, dark = make_caster(bake, judge, claims, share, seed, sources=lot, like=caster)
+        result.dark_cells += len(dark)
+        result.seconds["prepare"] += time.perf_counter() - start
+        if caster is None or not rays:
+            continue
+        before = result.rays + len(caster.sources)
+        spent += _cast_all(bake, caster, judge, share, result)
+        timed += result.rays - before
+        result.rays_per_second = timed / spent if spent else 0.0
+        if bake.scene is not None and not result.wrong_hidden:
+            _hunt(bake, caster, judge, share // GUIDED, result)
+        found.update(pairs_by_rays(bake, caster))
+        if result.wrong_hidden:
+            break
+    return judge, found
 
 
 @dataclass(frozen=True)
@@ -124,13 +153,13 @@ def replay(path: str | Path, bake: "BakeFolder | None" = None) -> Replayed:
         from ..data.store.bake_folder import read_bake
 
         bake = read_bake(case.bake)
-    table = bake.potential_cells if case.kind == "cell" else bake.potential_objects
+    table = bake.cell_sets if case.kind == "cell" else bake.object_sets
     if not (0 <= case.cell < table.shape[0] and 0 <= case.target < table.shape[1]):
         raise InputError(f"{path}: expected ids below {table.shape}, found cell {case.cell}, target {case.target}")
     origin, direction = np.array(case.origin), np.array(case.direction)
     judgement = make_judge(bake).judge(case.kind, case.cell, case.target, origin, origin + direction)
     pair = _pair_text(bake, case.cell, case.kind, case.target)
-    return Replayed(case, not table[case.cell, case.target], judgement, pair)
+    return Replayed(case, not table.has(case.cell, case.target), judgement, pair)
 
 
 def _pair_text(bake: "BakeFolder", cell: int, kind: str, target: int) -> str:
@@ -149,7 +178,13 @@ def make_judge(bake: "BakeFolder") -> Judge:
 
 
 def make_caster(
-    bake: "BakeFolder", judge: Judge, claims: tuple[np.ndarray, np.ndarray], rays: int, seed: int
+    bake: "BakeFolder",
+    judge: Judge,
+    claims: "tuple[np.ndarray | PairSets, np.ndarray | PairSets]",
+    rays: int,
+    seed: int,
+    sources: np.ndarray | None = None,
+    like: Caster | None = None,
 ) -> tuple[Caster | None, np.ndarray]:
     """Caster of the inhabitable cells that hold a free point, and the dark cells, which hold none.
 
@@ -159,8 +194,10 @@ def make_caster(
         claims: potentially visible cells and objects, shapes (cells, cells) and (cells, objects), bool.
         rays: that are to be cast.
         seed: of origins and directions.
+        sources: inhabitable cells to cast from, ids; None for all.
+        like: a caster of others of the same model, whose trees serve this one too.
     """
-    sources = np.flatnonzero(bake.graph.inhabitable)
+    sources = np.flatnonzero(bake.graph.inhabitable) if sources is None else sources
     none = Sightlines(np.zeros((0, 3, 3), np.int32))
     lines, glass = judge.lines or none, judge.glass
     share = -(-rays // max(len(sources), 1))
@@ -171,7 +208,10 @@ def make_caster(
     if not len(sources):
         return None, dark
     potential = claims[0][sources]
-    links = judge.links if judge.lines is None else contact_links(bake.graph.tiles.cells, bake.graph.cell_count)
+    if like is not None:
+        links = like.links
+    else:
+        links = judge.links if judge.lines is None else contact_links(bake.graph.tiles.cells, bake.graph.cell_count)
     caster = Caster(
         sources=sources,
         spots=[own for own in spots if len(own)],
@@ -184,6 +224,7 @@ def make_caster(
         opaque=(lines.triangles, lines.owners),
         glass=(glass.triangles, glass.owners),
         seed=seed,
+        scenes=None if like is None else like.scenes,
     )
     return caster, dark
 
@@ -199,7 +240,7 @@ def seen_by_rays(bake: "BakeFolder", rays: int, seed: int = 0) -> tuple[np.ndarr
     Returns:
         Shapes (cells, cells) and (cells, objects), bool.
     """
-    found = tuple(np.zeros_like(claims) for claims in (bake.potential_cells, bake.potential_objects))
+    found = tuple(np.zeros(sets.shape, bool) for sets in (bake.cell_sets, bake.object_sets))
     everything = tuple(np.ones_like(claims) for claims in found)
     caster, _ = make_caster(bake, make_judge(bake), everything, rays, seed)
     if caster is not None:
@@ -210,16 +251,20 @@ def seen_by_rays(bake: "BakeFolder", rays: int, seed: int = 0) -> tuple[np.ndarr
     return found
 
 
-def _cast_all(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, result: VerifyResult) -> None:
-    """Cast in batches on two threads; judge candidates in order; stop at the first wrong-hidden."""
+def _cast_all(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, result: VerifyResult) -> float:
+    """Cast in batches on two threads; judge candidates in order; stop at the first wrong-hidden.
+
+    Returns:
+        Seconds for all rays but the first of each cell.
+    """
     sources, rows = caster.sources, len(caster.sources)
     total = -(-rays // rows)
     # The first batch is one ray a cell: it compiles the kernels, outside the clock and on one thread.
     start = time.perf_counter()
     if judge_batch(bake, sources, judge, caster.cast(0, 1), result):
-        result.rays, result.cell_rays = rows, caster.cell_rays(1)
-        return
-    result.seconds["compile"] = time.perf_counter() - start
+        result.rays, result.cell_rays = result.rays + rows, result.cell_rays + caster.cell_rays(1)
+        return 0.0
+    result.seconds["compile"] = result.seconds.get("compile", 0.0) + time.perf_counter() - start
     blocks, done, spent = _blocks(rows, total), 1, 0.0
     with ThreadPoolExecutor(THREADS) as pool, phase("rays", rows * total, "ray") as bar:
         for block in blocks:
@@ -238,8 +283,9 @@ def _cast_all(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, resul
                 # Embree alone beside each block: when the machine is busy with something else, both suffer.
                 rate = caster.raw_rate(first, block[0][1])
                 result.embree_rates.append((rows * (done - first) / seconds, rate))
-    result.rays, result.cell_rays, result.seconds["rays"] = rows * done, caster.cell_rays(done), spent
-    result.rays_per_second = rows * (done - 1) / spent if spent else 0.0
+    result.rays, result.cell_rays = result.rays + rows * done, result.cell_rays + caster.cell_rays(done)
+    result.seconds["rays"] = result.seconds.get("rays", 0.0) + spent
+    return spent
 
 
 def _blocks(rows: int, total: int) -> list[list[tuple[int, int]]]:
@@ -254,27 +300,27 @@ def _blocks(rows: int, total: int) -> list[list[tuple[int, int]]]:
 
 def _hunt(bake: "BakeFolder", caster: Caster, judge: Judge, rays: int, result: VerifyResult) -> None:
     """Rays that look where an omission is likeliest, and random ones that bound what is missed."""
-    start, sources = time.perf_counter(), caster.sources
+    start, sources, before = time.perf_counter(), caster.sources, result.guided_rays
     falsifier = Falsifier(
         boxes=bake.graph.cells[sources],
         plans=bake.graph.plans.take(sources, bake.graph.cell_count),
         spots=caster.spots,
-        claimed=bake.potential_objects[sources],
+        claimed=caster.potential_objects,
         opaque=caster.opaque,
         glass=caster.glass,
         lines=judge.lines,
         hints=certificate_hints(bake, sources) if has_certificates(bake) else None,
-        cells=(bake.graph.cells, bake.potential_cells[sources]) if bake.claims_cells else None,
+        cells=(bake.graph.cells, caster.potential_cells) if bake.claims_cells else None,
         seed=caster.seed,
     )
     with phase("guided rays", rays, "ray") as bar:
         for found, state in falsifier.batches(rays):
             bar.reach(state.rays)
-            result.guided_rays = state.rays
+            result.guided_rays = before + state.rays
             if judge_batch(bake, sources, judge, found, result):
                 break
-    result.random_rays = falsifier.uniform_rays
-    result.seconds["guided rays"] = time.perf_counter() - start
+    result.random_rays = np.concatenate([result.random_rays, falsifier.uniform_rays])
+    result.seconds["guided rays"] = result.seconds.get("guided rays", 0.0) + time.perf_counter() - start
 
 
 def judge_batch(bake: "BakeFolder", sources: np.ndarray, judge: Judge, found: Candidates, result: VerifyResult) -> bool:

@@ -10,6 +10,7 @@ cells is format 1.
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -20,6 +21,7 @@ import pyarrow.parquet as pq
 from ..errors import InputError
 from ..graph import OTHER_AXES, CellGraph
 from ..kept import kept_shares
+from ..pair_sets import PairSets
 from ..rows import Rows
 from ..scene import Scene, turned
 from ..verdict import Verdict
@@ -155,22 +157,33 @@ class BakeFolder(FramedFolder):
         return read_table(path, LEAKS)
 
     @cached_property
-    def potential_cells(self) -> np.ndarray:
-        """Potentially visible cells, shape (cells, cells), bool; rows of inhabitable cells only.
+    def cell_sets(self) -> PairSets:
+        """Potentially visible cells of each inhabitable cell.
 
         All of them in a bake that claims nothing of cells, and from or to view cells with a plan.
         """
-        if not self.claims_cells:
-            return np.repeat(self.graph.inhabitable[:, None], self.graph.cell_count, axis=1)
-        out = self._matrix(self.cell_to_cell, "reached_cell_id", self.graph.cell_count)
-        beside = np.arange(self.graph.cell_count) >= self.graph.tile_count
-        out[:, beside], out[beside & self.graph.inhabitable] = self.graph.inhabitable[:, None], True
-        return out
+        graph, table = self.graph, self.cell_to_cell
+        pairs = table["cell_id"].to_numpy(), table["reached_cell_id"].to_numpy()
+        beside = np.arange(graph.cell_count) >= (graph.tile_count if self.claims_cells else 0)
+        found = PairSets.of(pairs, (graph.cell_count, graph.cell_count))
+        return replace(found, whole=beside & graph.inhabitable, shared=beside, sharing=graph.inhabitable)
+
+    @cached_property
+    def object_sets(self) -> PairSets:
+        """Potentially visible objects of each inhabitable cell."""
+        table = self.cell_to_object
+        pairs = table["cell_id"].to_numpy(), table["object_id"].to_numpy()
+        return PairSets.of(pairs, (self.graph.cell_count, self.manifest["counts"]["objects"]))
+
+    @cached_property
+    def potential_cells(self) -> np.ndarray:
+        """`cell_sets`, shape (cells, cells), bool: too much for tens of thousands of cells."""
+        return self.cell_sets[np.arange(self.graph.cell_count)]
 
     @cached_property
     def potential_objects(self) -> np.ndarray:
-        """Potentially visible objects, shape (cells, objects), bool; rows of inhabitable cells only."""
-        return self._matrix(self.cell_to_object, "object_id", self.manifest["counts"]["objects"])
+        """`object_sets`, shape (cells, objects), bool."""
+        return self.object_sets[np.arange(self.graph.cell_count)]
 
     def kept(self) -> tuple[np.ndarray, np.ndarray]:
         """Shares of the model's objects, and of its triangles at their finest, that each cell keeps.
@@ -181,11 +194,6 @@ class BakeFolder(FramedFolder):
         sizes = np.zeros(0, int) if self.scene is None else self.scene.triangle_counts
         table = self.cell_to_object
         return kept_shares(self.graph.cell_count, *(table[name].to_numpy() for name in CELL_TO_OBJECT[:2]), sizes)
-
-    def _matrix(self, table: pa.Table, target: str, targets: int) -> np.ndarray:
-        out = np.zeros((self.graph.cell_count, targets), bool)
-        out[table["cell_id"].to_numpy(), table[target].to_numpy()] = True
-        return out
 
 
 def read_bake(folder: str | Path) -> BakeFolder:

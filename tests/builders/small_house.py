@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 from viewcell.data.graph import CellGraph
+from viewcell.data.pair_sets import PairSets
 from viewcell.data.scene import Definition, Instance, Mesh, Role, Scene
 from viewcell.data.store.bake_folder import BakeFolder
 from viewcell.data.store.room_tables import read_room_table
@@ -41,6 +42,13 @@ class StandIn:
     rooms: pa.Table = field(default_factory=lambda: read_room_table(Path("none"), "rooms"))
     rooms_of_cells = property(BakeFolder.rooms_of_cells.func)
     cell_text = BakeFolder.cell_text
+    cell_sets = property(lambda self: sets_of(self.potential_cells))
+    object_sets = property(lambda self: sets_of(self.potential_objects))
+
+
+def sets_of(matrix: np.ndarray) -> PairSets:
+    """Sets whose pairs are those of a matrix of bool."""
+    return PairSets.of(np.nonzero(matrix), matrix.shape)
 
 
 def small_graph() -> CellGraph:

@@ -5,6 +5,7 @@ import pyarrow as pa
 import pytest
 import trimesh
 from builders import random_solids
+from builders.small_house import sets_of
 from viewcell.data.frame import in_frame
 from viewcell.data.scene import Role
 from viewcell.data.store.scene_folder import write_scene
@@ -84,7 +85,7 @@ def test_what_has_become_glass_proves_nothing(role, turned, cells, tmp_path):
 @pytest.mark.parametrize("role", Role)
 def test_verify_accuses_only_where_nothing_opaque_is_in_the_way(role, cells, tmp_path, monkeypatch):
     made = bake(scene(role), tmp_path / "b", settings=Settings(method="occluders", cells=cells), threads=1)
-    made.__dict__["potential_objects"] = np.array([[True, False, True]])
+    made.__dict__["object_sets"] = sets_of(np.array([[True, False, True]]))
     keep = np.array(made.cell_to_object["object_id"].to_numpy() != TARGET)
     made.__dict__["cell_to_object"] = made.cell_to_object.filter(pa.array(keep))
     result = verify_bake(made, rays=4000)
@@ -92,7 +93,7 @@ def test_verify_accuses_only_where_nothing_opaque_is_in_the_way(role, cells, tmp
     if not result.wrong_hidden:
         assert result.ok
     # The rays that are guided, alone.
-    monkeypatch.setattr(workbench_verify, "_cast_all", lambda *_: None)
+    monkeypatch.setattr(workbench_verify, "_cast_all", lambda *_: 0.0)
     assert verify_bake(made, rays=4000).wrong_hidden == (role not in OPAQUE)
     monkeypatch.undo()
     assert seen_by_rays(made, 4000)[1][0].tolist() == [True, role not in OPAQUE, True]

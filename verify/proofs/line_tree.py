@@ -278,7 +278,7 @@ def _check_objects(bake: "BakeFolder", cell: np.ndarray, ends: list[End], found:
     names = {end: n for n, end in enumerate({_name(end): end for end in ends})}
     numbers = np.array([names[_name(end)] for end in ends], np.int64)
     for source in np.flatnonzero(bake.graph.inhabitable):
-        hidden = np.flatnonzero(~bake.potential_objects[source] & present)
+        hidden = np.flatnonzero(~bake.object_sets[source] & present)
         mine = np.flatnonzero(cell == source)
         for target in hidden.tolist():
             low, high = bounds[target]

@@ -134,6 +134,7 @@ class Caster:
         opaque: triangles [grid steps], shape (m, 3, 3), and their owners; none for a bare graph.
         glass: the same of transparent objects.
         seed: of the directions.
+        scenes: Embree's, of the opaque triangles and of the others, where another caster has built them.
     """
 
     sources: np.ndarray
@@ -147,6 +148,7 @@ class Caster:
     opaque: tuple[np.ndarray, np.ndarray]
     glass: tuple[np.ndarray, np.ndarray]
     seed: int = 0
+    scenes: tuple | None = None
     seen_cells: np.ndarray = field(init=False)
     seen_objects: np.ndarray = field(init=False)
 
@@ -156,7 +158,8 @@ class Caster:
         # A ray starts in its own cell, which therefore needs no mark.
         self.seen_cells[np.arange(len(self.sources)), self.sources] = 1
         self._lock = threading.Lock()
-        self._scene, self._glass_scene = embree_scene(self.opaque[0]), embree_scene(self.glass[0])
+        self.scenes = self.scenes or (embree_scene(self.opaque[0]), embree_scene(self.glass[0]))
+        self._scene, self._glass_scene = self.scenes
         self._aims, self._maze, self._marks = self._make_aims(), Maze(), Sightings()
         self._buffers = threading.local()
         self._maze.boxes = _share(np.ascontiguousarray(self.boxes.reshape(-1, 6), np.int32))

@@ -1,9 +1,9 @@
 """Where rays start and what they are aimed at."""
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from ...data.graph import CellGraph
+from ...data.ragged import places_of
 from ..exact.plan import inside_plans
 from ..exact.sightline import Sightlines
 from ..exact.trace import Links
@@ -82,11 +82,13 @@ def frontier_points(links: Links, boxes: np.ndarray, potential: np.ndarray, coun
         Shape (rows, count, 3) [grid steps], float32; in a random cell where a row has no such cell.
     """
     rng, cells = np.random.default_rng(seed), len(boxes)
-    owner = np.repeat(np.arange(cells), np.diff(links.starts[::6]))
-    beside = csr_array((np.ones(len(owner), np.float32), (owner, links.cells)), shape=(cells, cells))
+    # Six sides a cell.
+    starts, sizes = links.starts[::6], np.diff(links.starts[::6])
     chosen = rng.integers(0, cells, (len(potential), count))
     for row, own in enumerate(potential):
-        frontier = np.flatnonzero(((own.astype(np.float32) @ beside) > 0) & ~own)
+        here = np.flatnonzero(own)
+        beside = links.cells[places_of(starts[here], sizes[here])]
+        frontier = np.unique(beside[~own[beside]])
         if len(frontier):
             chosen[row] = rng.choice(frontier, count)
     low, high = boxes[chosen, 0].astype(np.float64), boxes[chosen, 1]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...data.errors import InputError
 from ...data.progress import phase, shown
-from ...data.ragged import starts_of
+from ...data.ragged import owners_of
 from ...data.scene import Scene
 from ...data.store.bake_folder import BakeFolder, cells_table, portals_table, read_bake
 from ...data.store.scene_folder import held_manifest, refuse_others
@@ -149,10 +149,12 @@ def _cells_in_order(bake: BakeFolder, cells: np.ndarray, device: Device) -> tupl
     graph = bake.graph
     if not bake.claims_cells:
         return None, np.arange(graph.cell_count)
-    seen = bake.potential_cells[cells]
-    starts = starts_of(seen.sum(axis=1))
-    order = tour_order(starts, np.nonzero(seen)[1], _middles(graph.cells.astype(np.int64)), device)
-    return (starts, np.nonzero(seen[:, order])[1]), order
+    starts, members = bake.cell_sets.lists(cells)
+    order = tour_order(starts, members, _middles(graph.cells.astype(np.int64)), device)
+    placed = np.empty(len(order), np.int64)
+    placed[order] = np.arange(len(order))
+    members = placed[members]
+    return (starts, members[np.lexsort((members, owners_of(starts)))]), order
 
 
 def _runs_told(sets: DisplaySets, order: np.ndarray) -> dict:

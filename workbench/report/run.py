@@ -89,7 +89,7 @@ def choose_cells(bake: "BakeFolder") -> dict[int, str]:
         sources = sources[sources < bake.graph.tile_count]
     if not len(sources):
         return {}
-    potential = _potential(bake)[sources].sum(axis=1)
+    potential = _potential_counts(bake)[sources]
     seen = _seen_counts(bake)[sources]
     ratio = potential / np.maximum(seen, 1)
     by_size = np.argsort(potential, kind="stable")
@@ -116,9 +116,11 @@ def _seen_counts(bake: "BakeFolder") -> np.ndarray:
     return np.bincount(visible_rows(table)["cell_id"].to_numpy(), minlength=bake.graph.cell_count)
 
 
-def _potential(bake: "BakeFolder") -> np.ndarray:
-    """What `_seen_counts` counts, potentially visible, shape (cells, targets), bool."""
-    return bake.potential_cells[:, : bake.graph.tile_count] if speaks_of_cells(bake) else bake.potential_objects
+def _potential_counts(bake: "BakeFolder") -> np.ndarray:
+    """Number of what `_seen_counts` counts that is potentially visible, shape (cells,)."""
+    if not speaks_of_cells(bake):
+        return bake.object_sets.sizes
+    return bake.cell_sets.sizes - np.where(bake.graph.inhabitable, bake.graph.cell_count - bake.graph.tile_count, 0)
 
 
 def _write(bake: "BakeFolder", chosen: dict[int, str], told: tuple[dict | None, list[str]], folder: Path) -> None:
@@ -169,7 +171,7 @@ class _Shadows:
 def _draw_objects(bake: "BakeFolder", painter: Painter, shadows: _Shadows, cell: int, path: Path) -> tuple[str, str]:
     """Draw the objects that a view cell sees; returns the picture's title and caption."""
     seen, lines = _sights(bake, cell, "object")
-    kinds = np.where(bake.potential_objects[cell], "unknown", "hidden")
+    kinds = np.where(bake.object_sets[cell], "unknown", "hidden")
     kinds[seen] = "seen"
     unknown, hidden = (int((kinds == kind).sum()) for kind in ("unknown", "hidden"))
     title = f"View cell {cell}: {counted(len(seen), 'object')} seen, {unknown:,} unknown, {hidden:,} hidden"
@@ -200,13 +202,13 @@ def _draw_set(bake: "BakeFolder", painter: Painter, storeys: list[Storey], cell:
     """Draw one cell's set; returns the picture's title and caption."""
     seen_cells, cell_lines = _sights(bake, cell, "cell")
     _, object_lines = _sights(bake, cell, "object")
-    kinds = np.where(bake.potential_cells[cell], "unknown", "hidden").astype(object)
+    kinds = np.where(bake.cell_sets[cell], "unknown", "hidden").astype(object)
     # Nothing is claimed of cells that stand at an angle.
     kinds[bake.graph.tile_count :] = "inhabitable"
     kinds[seen_cells] = "seen"
     kinds[cell] = "source"
     unknown, drawn = int((kinds == "unknown").sum()), np.concatenate([cell_lines, object_lines])
-    potential = int(bake.potential_cells[cell, : bake.graph.tile_count].sum())
+    potential = int(bake.cell_sets[cell][: bake.graph.tile_count].sum())
     storey = next(s for s in storeys if cell in s.cells)
     low, high = bake.graph.cells[cell, :, 2]
     section = plan_of(storey, bake.grid_m)
@@ -245,8 +247,8 @@ def _sizes(bake: "BakeFolder", kind: str) -> np.ndarray:
 def _unknown_targets(bake: "BakeFolder", cell: int) -> list[str]:
     """Table of the largest targets that have neither witness nor proof."""
     rows = []
-    kinds = [("cell", bake.potential_cells[cell, : bake.graph.tile_count])] if speaks_of_cells(bake) else []
-    for kind, potential in (*kinds, ("object", bake.potential_objects[cell])):
+    kinds = [("cell", bake.cell_sets[cell][: bake.graph.tile_count])] if speaks_of_cells(bake) else []
+    for kind, potential in (*kinds, ("object", bake.object_sets[cell])):
         unknown = potential.copy()
         unknown[_sights(bake, cell, kind)[0]] = False
         unknown[cell if kind == "cell" else []] = False
@@ -318,7 +320,7 @@ def _set_table(bake: "BakeFolder", chosen: dict[int, str]) -> list[str]:
     ]
     lines.append("|---|---|---|---|---|---|")
     for cell in chosen:
-        potential, known = int(_potential(bake)[cell].sum()), int(seen[cell])
+        potential, known = int(_potential_counts(bake)[cell]), int(seen[cell])
         ratio = f"{potential / known:.3f}" if known else "no witness"
         lines.append(
             f"| {cell} | {bake.graph.cell_names[cell]} | {potential:,} | {known:,} | {ratio} | {potential - known:,} |"
