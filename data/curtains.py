@@ -10,6 +10,7 @@ with its halves, their halves, and so on. Source of the idea of occluders at any
 5.2; the ways past them are in kernels/curtains.py.
 """
 
+import time
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import combinations
@@ -49,19 +50,30 @@ TIP_STEPS = 400
 CLEAR_STEPS = 1.0
 
 
-def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float) -> Blockers:
+class OutOfTime(Exception):
+    """Something is not made, as that would take longer than it may."""
+
+
+def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float, *, seconds: float = np.inf) -> Blockers:
     """Curtains of a model.
 
     Args:
         elements: triangles of each closed opaque element [grid steps], shape (m, 3, 3), int32.
         faces: triangles of opaque objects, shape (n, 3, 3), int32.
         grid_m: grid step [m].
+        seconds: that it may take.
+
+    Raises:
+        OutOfTime: it would take longer, as the lots that are done took.
     """
+    started = time.perf_counter()
     least = LEAST_M2 / grid_m**2
     boxes, kinds = [np.zeros((0, 2, 3), np.int64)], [np.zeros(0, np.int64)]
     # Opaque is what no triangle of its element comes near: of elements that are alike, one tells.
     firsts, shifts = _alike(elements)
-    for lot in track(lots_of(firsts), "curtains", "lot"):
+    for done, lot in enumerate(track(every := lots_of(firsts), "curtains", "lot")):
+        if (time.perf_counter() - started) * (len(every) / done if done else 1.0) > seconds:
+            raise OutOfTime
         mine, shifts = shifts[: len(lot)], shifts[len(lot) :]
         owner, quads = _sections(lot, least, THIN_M / grid_m)
         held = inside(quads, owner, lot)
