@@ -34,6 +34,12 @@ def join_blockers(parts: list[Blockers]) -> Blockers:
     return Blockers(boxes, np.concatenate([part.axis for part in parts]))
 
 
+def strong_blockers(blockers: Blockers, least: float) -> Blockers:
+    """Those of some axial rectangles that are nowhere narrower than so many grid steps."""
+    wide = np.sort(blockers.boxes[:, 1] - blockers.boxes[:, 0], axis=1)[:, 1] >= least
+    return Blockers(blockers.boxes[wide], blockers.axis[wide])
+
+
 def find_blockers(graph: CellGraph, opaque: OpaquePlanes | None = None) -> Blockers:
     """Blockers of every plane that holds a cell face or an opaque rectangle; each opaque piece lies in one or more.
 

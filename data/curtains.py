@@ -10,6 +10,7 @@ with its halves, their halves, and so on. Source of the idea of occluders at any
 5.2; the ways past them are in kernels/curtains.py.
 """
 
+import time
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import combinations
@@ -20,10 +21,10 @@ from .blockers import Blockers
 from .outlines import outline, tiles
 from .progress import track
 from .ragged import lots, places_of, starts_of
-from .scene import turned
+from .scene import GRID_LIMIT, turned
 from .sections import largest_sections, over
 from .shapes import copies, first_alike
-from .solids import winds_around
+from .solids import rays_wind, winds_around
 
 # `Blockers.axis` of a curtain from the corner of its plan box with the least x and y to the opposite one, and of one
 # from least x and greatest y.
@@ -49,19 +50,30 @@ TIP_STEPS = 400
 CLEAR_STEPS = 1.0
 
 
-def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float) -> Blockers:
+class OutOfTime(Exception):
+    """Something is not made, as that would take longer than it may."""
+
+
+def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float, *, seconds: float = np.inf) -> Blockers:
     """Curtains of a model.
 
     Args:
         elements: triangles of each closed opaque element [grid steps], shape (m, 3, 3), int32.
         faces: triangles of opaque objects, shape (n, 3, 3), int32.
         grid_m: grid step [m].
+        seconds: that it may take.
+
+    Raises:
+        OutOfTime: it would take longer, as the lots that are done took.
     """
+    started = time.perf_counter()
     least = LEAST_M2 / grid_m**2
     boxes, kinds = [np.zeros((0, 2, 3), np.int64)], [np.zeros(0, np.int64)]
     # Opaque is what no triangle of its element comes near: of elements that are alike, one tells.
     firsts, shifts = _alike(elements)
-    for lot in track(lots_of(firsts), "curtains", "lot"):
+    for done, lot in enumerate(track(every := lots_of(firsts), "curtains", "lot")):
+        if (time.perf_counter() - started) * (len(every) / done if done else 1.0) > seconds:
+            raise OutOfTime
         mine, shifts = shifts[: len(lot)], shifts[len(lot) :]
         owner, quads = _sections(lot, least, THIN_M / grid_m)
         held = inside(quads, owner, lot)
@@ -282,17 +294,57 @@ def _to_corners(quads: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
 
 def _opaque(quads: np.ndarray, owner: np.ndarray, elements: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Those of some rectangles that lie inside the surfaces that own them, borders aside, and their owners; exactly."""
-    clear = np.zeros(len(quads), bool)
-    for rows, row, triangles in _pairs(quads, owner, elements):
-        held = winds_around(quads[rows].mean(axis=1), row, triangles)
-        near = np.flatnonzero(held[row])
-        near = near[meeting(quads[rows], row[near], triangles[near], CLEAR_STEPS)]
-        near = near[~clearly_missed(quads[rows][row[near]], triangles[near])]
-        for which in near.tolist():
-            if held[row[which]] and crossed(quads[rows][row[which]], triangles[which]):
-                held[row[which]] = False
-        clear[rows] = held
-    return owner[clear], quads[clear]
+    every = np.concatenate([np.zeros((0, 3, 3), np.int32), *elements])
+    middle = quads.sum(axis=1)
+    # All that is straight above the middle.
+    up = np.stack([middle // 2, -(-middle // 2)], axis=1)
+    up[:, 1, 2] = 2 * GRID_LIMIT
+    row, which = _boxed(up, owner, elements)
+    held = rays_wind(middle, row, every[which])
+    rows = np.flatnonzero(held)
+    row, which = _boxed(np.sort(quads[rows], axis=1), owner[rows], elements, int(2 * CLEAR_STEPS + 2))
+    near = meeting(quads[rows], row, every[which], CLEAR_STEPS)
+    row, which = rows[row[near]], which[near]
+    for one in np.flatnonzero(~clearly_missed(quads[row], every[which])).tolist():
+        if held[row[one]] and crossed(quads[row[one]], every[which[one]]):
+            held[row[one]] = False
+    return owner[held], quads[held]
+
+
+def _boxed(
+    boxes: np.ndarray, owner: np.ndarray, elements: list[np.ndarray], margin: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes, and those triangles of their elements that their boxes meet or touch.
+
+    Args:
+        boxes: low and high corners, shape (n, 2, 3), int.
+        owner: element of each, ascending, shape (n,).
+        elements: triangles of each, (m, 3, 3), int32.
+        margin: boxes are so much wider and longer.
+
+    Returns:
+        Box, ascending, and triangle among those of all elements, of each pair.
+    """
+    ends, starts = (
+        starts_of([len(triangles) for triangles in elements]),
+        np.searchsorted(owner, range(len(elements) + 1)),
+    )
+    found = [(np.zeros(0, np.int64), np.zeros(0, np.int64))]
+    low, high = (boxes + margin * np.array([[-1, -1, 0], [1, 1, 0]])).astype(np.int32).transpose(1, 2, 0)
+    for number in np.flatnonzero(np.diff(starts)).tolist():
+        # Corner by corner, and coordinate by coordinate, in lots that stay in the cache.
+        one, two, three = elements[number].transpose(1, 2, 0)
+        least, most = np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
+        step = max(1, PAIRS // len(elements[number]))
+        for begin in range(starts[number], starts[number + 1], step):
+            mine = slice(begin, min(begin + step, starts[number + 1]))
+            meet = np.ones((mine.stop - begin, least.shape[1]), bool)
+            for axis in range(3):
+                meet &= least[axis] <= high[axis, mine, None]
+                meet &= most[axis] >= low[axis, mine, None]
+            row, triangle = np.nonzero(meet)
+            found.append((begin + row, ends[number] + triangle))
+    return tuple(np.concatenate(column) for column in zip(*found, strict=True))
 
 
 def clearly_missed(quads: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .apart import taken_apart
 from .graph import OTHER_AXES, flat_boxes
 from .outlines import OBLIQUE_STEPS, Covered, Outlines, cover, outline
 
@@ -104,14 +105,19 @@ def carved_planes(triangles: np.ndarray, carve_area: float) -> tuple[OpaquePlane
 
 
 def _outlines(triangles: np.ndarray) -> tuple[Outlines, np.ndarray]:
-    """Outlines of every plane that holds axial triangles, and its axis and coordinate, shape (planes, 2), ordered."""
+    """Outlines of every plane that holds axial triangles, and its axis and coordinate, shape (planes, 2), ordered.
+
+    Planes of much that lies apart are there several times.
+    """
     corners, planes = [np.zeros((0, 3, 2), np.int64)], [np.zeros((0, 2), np.int64)]
     for axis in range(3):
         chosen = triangles[np.ptp(triangles[:, :, axis], axis=1) == 0]
         corners.append(chosen[:, :, OTHER_AXES[axis]].astype(np.int64))
         planes.append(np.column_stack([np.full(len(chosen), axis), chosen[:, 0, axis]]))
     distinct, owner = np.unique(np.concatenate(planes), axis=0, return_inverse=True)
-    return outline(np.concatenate(corners), owner.ravel(), len(distinct)), distinct
+    flat = np.concatenate(corners)
+    part, plane = taken_apart(owner.ravel(), np.stack([flat.min(axis=1), flat.max(axis=1)], axis=1), len(distinct))
+    return outline(flat, part, len(plane)), distinct[plane]
 
 
 def _covered(parts: Iterable[Covered], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from .blockers import Blockers, find_blockers, join_blockers
-from .curtains import find_curtains
+from .curtains import OutOfTime, find_curtains
 from .exposed import exposed_faces
 from .graph import CellGraph
 from .occludees import Occludees, find_occludees
@@ -131,7 +131,20 @@ class PreparedModel:
     @cached_property
     def curtains(self) -> Blockers:
         """Upright rectangles at any angle, inside closed elements or on faces."""
-        return find_curtains(self.large_closed, self.scene.triangles(*OPAQUE)[0], self.scene.grid_m)
+        return self._curtains_within(np.inf)
+
+    def make_curtains(self, seconds: float) -> bool:
+        """Make the curtains unless that should take longer; returns whether they are made."""
+        if "curtains" not in vars(self):
+            try:
+                self.curtains = self._curtains_within(seconds)
+            except OutOfTime:
+                return False
+        return True
+
+    def _curtains_within(self, seconds: float) -> Blockers:
+        faces = self.scene.triangles(*OPAQUE)[0]
+        return find_curtains(self.large_closed, faces, self.scene.grid_m, seconds=seconds)
 
     @cached_property
     def walls(self) -> Blockers:

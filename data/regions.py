@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from .apart import taken_apart
 from .blockers import Blockers
 from .graph import OTHER_AXES, flat_boxes
 from .opaque import OpaquePlanes
@@ -106,6 +107,8 @@ def _connected(
         planes: coordinates, likewise.
         least: smaller parts are left out [squared grid steps].
     """
+    owner, plane = taken_apart(owner, rectangles, len(planes))
+    axes, planes = axes[plane], planes[plane]
     order = np.argsort(owner, kind="stable")
     owner, rectangles = owner[order], rectangles[order]
     points = [[(np.repeat(owner, 2), rectangles[:, :, c].ravel())] for c in (0, 1)]

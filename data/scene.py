@@ -286,12 +286,16 @@ class Scene:
 
     def bounds(self) -> np.ndarray:
         """Low and high corner of all triangles [grid steps], shape (2, 3), int64."""
-        triangles, _ = self.triangles()
-        return np.array([triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))], np.int64)
+        low, high = self._object_bounds[self.triangle_counts > 0].transpose(1, 0, 2)
+        return np.array([low.min(axis=0), high.max(axis=0)])
 
     def object_bounds(self) -> np.ndarray:
         """Snapped box of each object [grid steps], shape (objects, 2, 3), int64; empty objects get min > max."""
-        return bounds_by_owner(*self.triangles(), len(self.objects))
+        return self._object_bounds.copy()
+
+    @cached_property
+    def _object_bounds(self) -> np.ndarray:
+        return bounds_by_owner(*self._flat[:2], len(self.objects))
 
 
 def bounds_by_owner(triangles: np.ndarray, owners: np.ndarray, count: int) -> np.ndarray:

@@ -77,6 +77,41 @@ def winds_around(points: np.ndarray, row: np.ndarray, triangles: np.ndarray) -> 
     return np.abs(_windings(points, row, triangles)) > 0.5
 
 
+def rays_wind(points: np.ndarray, row: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """As `winds_around`, by what is above each point: many times faster, of triangles that may be above alone.
+
+    Signs in the plan are exact; a point on a level line with a corner is taken a little further along x, and along y.
+
+    Args:
+        points: twice their coordinates, shape (n, 3), int64.
+        row: point of each triangle, shape (m,).
+        triangles: as of `winds_around`, at least all that have something straight above their point.
+
+    Returns:
+        False also where the point lies so near to a surface that float64 does not tell.
+    """
+    a, b, c = (2 * triangles[:, k].astype(np.int64) - points[row] for k in range(3))
+    one, two, three = (_turns(x, y) for x, y in ((a, b), (b, c), (c, a)))
+    hit = np.flatnonzero((one == two) & (two == three))
+    normal = np.cross((b - a)[hit].astype(float), (c - a)[hit].astype(float))
+    terms = normal * a[hit]
+    height = terms.sum(axis=1)
+    doubt = np.abs(height) <= 1e-9 * np.abs(terms).sum(axis=1)
+    # The plane is above where it rises from below along its upward normal.
+    above = height * one[hit] > 0
+    winding = np.bincount(row[hit[above]], one[hit[above]], minlength=len(points))
+    winding[row[hit[doubt]]] = 0
+    return winding != 0
+
+
+def _turns(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """1 where the way from a to b in plan passes the origin on its left, -1 where on its right, 0 if it is a point."""
+    way = b - a
+    side = np.sign(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    side = np.where(side == 0, -np.sign(way[:, 1]), side)
+    return np.where(side == 0, np.sign(way[:, 0]), side)
+
+
 def _windings(points: np.ndarray, row: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """As `winding_numbers`, of a surface for each point; arguments as of `winds_around`."""
     places, angles = points.T, np.empty(len(row))

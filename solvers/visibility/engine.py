@@ -61,6 +61,12 @@ class Engine(Protocol):
     def proof_occluders(self) -> tuple[Blockers, Regions | None, Patches | None]:
         """What certificates name."""
 
+    def prepare(self, seconds: float = np.inf) -> bool:
+        """Make what `visible` needs and `coarse` does not, unless that should take longer; returns whether it is made.
+
+        Whoever does not call it has it made by the first `visible`.
+        """
+
     def compile(self) -> None:
         """Load the kernels, so that their compilation is not counted as visibility."""
 
@@ -76,8 +82,14 @@ class Engine(Protocol):
     def glance(self, block: np.ndarray, number: int) -> Rows:
         """Objects that some sources see at a glance, seen pairs only, ordered; others with each number."""
 
-    def coarse(self, cells: np.ndarray, group: np.ndarray, known: Rows) -> Rows | None:
-        """What groups of sources may see, as of `left_by_groups`; None from an engine that has no such thing."""
+    def coarse_steps(self) -> int:
+        """Of `coarse` and `narrow` together; asked before either; 0 from an engine that has no such thing."""
+
+    def coarse(self, cells: np.ndarray, group: np.ndarray) -> Rows:
+        """What groups of sources may see at worst, as of `left_by_nodes`."""
+
+    def narrow(self, rows: Rows, step: int) -> Rows:
+        """Those of some pairs that may be seen that are not hidden at a step, as of `narrowed`."""
 
     def unknown(self, block: np.ndarray) -> Part:
         """Rows that claim nothing: everything stays potential."""

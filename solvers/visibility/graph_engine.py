@@ -43,6 +43,10 @@ class GraphEngine:
         """As of `Engine`."""
         return self.model.blockers, None, None
 
+    def prepare(self, seconds: float = np.inf) -> bool:
+        """As of `Engine`: all is made."""
+        return True
+
     def compile(self) -> None:
         """As of `Engine`."""
         for module in (target, trace, flood, *([line_tree] if self._certify else [])):
@@ -64,8 +68,9 @@ class GraphEngine:
         """As of `Engine`: there are no objects."""
         return NO_OBJECTS
 
-    def coarse(self, cells: np.ndarray, group: np.ndarray, known: Rows) -> None:
+    def coarse_steps(self) -> int:
         """As of `Engine`: there are no objects."""
+        return 0
 
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""

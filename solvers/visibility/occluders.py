@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from ...data.blockers import Blockers, join_blockers
+from ...data.blockers import Blockers, join_blockers, strong_blockers
 from ...data.occludees import Occludees
 from ...data.own_frames import find_own_frames
 from ...data.plans import NO_PLANS, Plans
@@ -39,6 +39,9 @@ NODE_CAP, PIECE_CAP = 40, 2000
 # View cells and pieces are not halved below this, and a proof has at most so many subshafts.
 SMALLEST_M = (0.0625, 0.0625)
 SHAFT_CAP = 200
+# Rectangles that are narrower hide little, and most of them are: lines that look at the others alone are several times
+# as fast.
+STRONG_M = 1.0
 # Sightlines shot near each line that a frame lets pass, round by round.
 FRAME_ROUNDS = AIM_ROUNDS[:2]
 
@@ -67,7 +70,13 @@ class OccluderModel:
 
     @classmethod
     def of(
-        cls, sights: Sights, *, blockers: Blockers | None = None, shadows: bool = True, certify: bool = False
+        cls,
+        sights: Sights,
+        *,
+        blockers: Blockers | None = None,
+        shadows: bool = True,
+        certify: bool = False,
+        rough: bool = False,
     ) -> "OccluderModel":
         """Copy a prepared model's occluders to the device.
 
@@ -77,15 +86,18 @@ class OccluderModel:
             shadows: whether regions and patches are to hide.
             certify: hide only as certificates can say it: not in frames of view cells at an angle, and every face for
                 itself, also where another element stands against it.
+            rough: strong rectangles alone, where lines are to hide; curtains of a large model take most of the time.
         """
         model, device = sights.model, sights.device
         regions, patches = (model.regions, model.patches) if shadows else (no_regions(), no_patches())
-        walls = model.walls if shadows else regions.blockers
+        walls = model.walls if shadows and not rough else regions.blockers
         if blockers is not None:
             walls = join_blockers([blockers, walls])
+        if rough:
+            walls = strong_blockers(walls, STRONG_M / model.scene.grid_m)
         smallest = tuple(round(size / model.scene.grid_m) for size in SMALLEST_M)
         shields = device_shields(regions, patches, device)
-        wanted = shadows and not certify
+        wanted = shadows and not rough and not certify
         own = find_own_frames(model.scene, model.large_closed, sights.cells, sights.plans) if wanted else []
         searches = tuple(FrameSearch.of(frame, device) for frame in own)
         occludees = model.whole_occludees if certify else model.occludees
@@ -133,40 +145,17 @@ def seen_objects(
     return refine_objects(model, _hide_in_frames(model, rows), aim_rounds, ledger)
 
 
-def left_by_groups(model: OccluderModel, cells: np.ndarray, group: np.ndarray, known: Rows) -> Rows:
-    """Every object that occluders do not hide from the whole box around each group of view cells, at once.
+def boxes_left(model: OccluderModel, source: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    """Rows whose box their view cell meets, or few lines do not hide from it, shape (n,), bool."""
+    left = np.ones(len(source), bool)
+    rows = np.flatnonzero(_clear(model, NO_PLANS, source, boxes))
+    left[rows] = ~_hide_nodes(model, None, source[rows], boxes[rows])
+    return left
 
-    One proof serves a group of view cells and, where it can, a node of the hierarchy of objects; nothing is shot at.
-    What is hidden from a group is hidden from each of its cells, exactly; what is not may be.
 
-    Args:
-        model: occluders and occludees.
-        cells: view cells, shape (n,), int.
-        group: of each, from 0 up, none empty, shape (n,), int.
-        known: pairs of them that are seen, which nothing can hide; ordered.
-
-    Returns:
-        Pairs of every cell and what its group may see, without witnesses, ordered.
-    """
-    count, order = int(group.max(initial=-1)) + 1, np.argsort(group, kind="stable")
-    starts = np.searchsorted(group[order], np.arange(count + 1))
-    boxes = model.cells[cells[order]]
-    boxes = np.stack(
-        [np.minimum.reduceat(boxes[:, 0], starts[:-1]), np.maximum.reduceat(boxes[:, 1], starts[:-1])], axis=1
-    )
-    around, occludees = model.from_cells(boxes), model.occludees
-    hide, clear = partial(_hide_nodes, around, None), partial(_clear, around, NO_PLANS)
-    found = descend(boxes, np.arange(count), occludees.levels, occludees.objects, FIRST_LEVEL, hide, clear, haste=True)
-    rows = Rows.unseen(*found)
-    group_of = np.full(len(model.cells), -1)
-    group_of[cells] = group
-    rows.adopt(known.relabelled(group_of).order())
-    potential = rows.seen
-    potential[_prove_pieces(around, rows, None)[0]] = True
-    rows = rows.take(potential)
-    sizes = np.diff(starts)[rows.source]
-    members = order[places_of(starts[rows.source], sizes)]
-    return Rows.unseen(cells[members], np.repeat(rows.target, sizes)).order()
+def pieces_left(model: OccluderModel, rows: Rows) -> np.ndarray:
+    """Unseen rows of which pieces could not be hidden; some are named several times."""
+    return _prove_pieces(model, rows, None)[0]
 
 
 def refine_objects(

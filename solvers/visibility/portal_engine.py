@@ -22,11 +22,12 @@ from . import aim as aiming
 from . import cells as cell_search
 from .aim import Sights
 from .cells import CellModel, cell_rows, join_cell_rows
+from .coarse import left_by_nodes, narrowed, steps_below
 from .engine import Part, join_objects, unknown_rows
 from .glance import glance
 from .ledger import Ledger
 from .objects import object_rows
-from .occluders import OccluderModel, hidden_boxes, left_by_groups, refine_objects, seen_objects
+from .occluders import OccluderModel, hidden_boxes, refine_objects, seen_objects
 from .shared import share_sightlines
 
 # With "auto" the occluders are asked about cells of whose potential objects more than this share is unknown.
@@ -59,7 +60,7 @@ class PortalEngine:
             certify: call hidden only what has a certificate, and keep it. All methods then hide by the model's
                 occluders, which can be checked against the model alone; "portals" leaves out oblique ones for cells.
         """
-        self._occluders, self._making = None, Lock()
+        self._occluders, self._rough, self._making = None, None, Lock()
         self._certify, self._least_unknown = certify, LEAST_UNKNOWN[method]
         self._objects = len(model.scene.objects)
         tiles = graph.tiles
@@ -83,6 +84,10 @@ class PortalEngine:
                     wp.load_module(shaft.__name__, device=self.model.device.name)
                     self._occluders = OccluderModel.of(self._sights, certify=self._certify)
             return self._occluders
+
+    def prepare(self, seconds: float = np.inf) -> bool:
+        """As of `Engine`: all is made; occluders are made when they are first asked."""
+        return True
 
     def compile(self) -> None:
         """As of `Engine`."""
@@ -140,10 +145,22 @@ class PortalEngine:
         """As of `Engine`."""
         return glance(self._sights, block, number)
 
-    def coarse(self, cells: np.ndarray, group: np.ndarray, known: Rows) -> Rows | None:
+    def coarse_steps(self) -> int:
         """As of `Engine`; certificates speak of single cells, and portals alone hide by nothing else."""
         alone = self._certify or self._least_unknown == np.inf
-        return None if alone else left_by_groups(self.occluders, cells, group, known)
+        if alone:
+            return 0
+        steps = steps_below(self.occluders)
+        self._rough = OccluderModel.of(self._sights, rough=True)
+        return 1 + len(steps)
+
+    def coarse(self, cells: np.ndarray, group: np.ndarray) -> Rows:
+        """As of `Engine`."""
+        return left_by_nodes(self._rough, cells, group)
+
+    def narrow(self, rows: Rows, step: int) -> Rows:
+        """As of `Engine`."""
+        return narrowed(self._rough, self.occluders, rows, step)
 
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""

@@ -80,7 +80,10 @@ def segments(
 
 
 def open_pieces(
-    first: np.ndarray, last: np.ndarray, prove: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+    first: np.ndarray,
+    last: np.ndarray,
+    prove: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+    enough: int = OPEN_ENOUGH,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pieces of objects that cannot be hidden, looked at a few at a time until some of an object are known.
 
@@ -88,6 +91,7 @@ def open_pieces(
         first: piece of each object to begin with, shape (n,), int.
         last: past its last one.
         prove: given objects and pieces, row by row, says which rows could not be hidden, and a line to each of those.
+        enough: an object with so many pieces that could not be hidden is not looked at further.
 
     Returns:
         Object and piece of each that could not be hidden, and the ends of a line to it, shape (m, 2, 3). An object
@@ -95,7 +99,7 @@ def open_pieces(
     """
     first, known, step = first.copy(), np.zeros(len(first), int), 1
     found = [(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2, 3)))]
-    while len(active := np.flatnonzero((first < last) & (known < OPEN_ENOUGH))):
+    while len(active := np.flatnonzero((first < last) & (known < enough))):
         sizes = np.minimum(step, last[active] - first[active])
         at, piece = np.repeat(active, sizes), places_of(first[active], sizes)
         left, lines = prove(at, piece)

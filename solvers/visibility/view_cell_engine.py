@@ -1,6 +1,8 @@
 """Visibility of a model from view cells of any kind: of objects, not of cells."""
 
 from copy import copy
+from dataclasses import replace
+from threading import Lock
 
 import numpy as np
 import warp as wp
@@ -15,10 +17,11 @@ from ...data.rows import Rows
 from ...kernels import aim, line_tree, shaft, sightline, target
 from ...kernels.launch import CPU, Device
 from .aim import AIM_ROUNDS, Sights
+from .coarse import left_by_nodes, narrowed, steps_below
 from .engine import Part, join_objects, unknown_rows
 from .glance import glance
 from .ledger import Ledger
-from .occluders import OccluderModel, left_by_groups, look_at_objects, seen_objects
+from .occluders import OccluderModel, look_at_objects, seen_objects
 from .projection import VlodSettings, vlod_hidden
 from .shared import share_sightlines
 
@@ -58,8 +61,10 @@ class ViewCellEngine:
         self._objects = len(model.scene.objects)
         blockers = None if portal_graph is None or certify else model.blockers(portal_graph)
         sights = Sights.of(model, cells, seed, device, plans)
-        shadows = method != "portals" or certify
-        self.model = OccluderModel.of(sights, blockers=blockers, shadows=shadows, certify=certify)
+        self._options = {"blockers": blockers, "shadows": method != "portals" or certify, "certify": certify}
+        # What stands at an angle takes most of the time of a large model, and is made when it is needed.
+        self._making, self._ready = Lock(), False
+        self.model = self._rough = OccluderModel.of(sights, **self._options, rough=True)
 
     @property
     def proof_occluders(self) -> tuple[Blockers, Regions, Patches]:
@@ -70,7 +75,15 @@ class ViewCellEngine:
         """The same engine for other view cells [grid steps], shape (n, 2, 3), int32."""
         other = copy(self)
         other.model = self.model.from_cells(cells)
+        other._rough = replace(self._rough, sights=other.model.sights, frames=())
         return other
+
+    def prepare(self, seconds: float = np.inf) -> bool:
+        """As of `Engine`, by one thread for all."""
+        with self._making:
+            if not self._ready and (not self._options["shadows"] or self._prepared.make_curtains(seconds)):
+                self.model, self._ready = OccluderModel.of(self.model.sights, **self._options), True
+            return self._ready
 
     def compile(self) -> None:
         """As of `Engine`."""
@@ -79,6 +92,7 @@ class ViewCellEngine:
 
     def visible(self, block: np.ndarray, *, aim: bool = True) -> Part:
         """As of `Engine`."""
+        self.prepare()
         rounds = AIM_ROUNDS if aim else ()
         if self._vlod is not None:
             return Part(None, self._by_projection_points(block, rounds))
@@ -98,10 +112,18 @@ class ViewCellEngine:
         """As of `Engine`."""
         return glance(self.model.sights, block, number)
 
-    def coarse(self, cells: np.ndarray, group: np.ndarray, known: Rows) -> Rows | None:
+    def coarse_steps(self) -> int:
         """As of `Engine`; certificates speak of single cells, and vLOD's method hides by nothing else."""
-        whole = self._certify or self._vlod is not None
-        return None if whole else left_by_groups(self.model, cells, group, known)
+        alone = self._certify or self._vlod is not None
+        return 0 if alone else 1 + len(steps_below(self.model))
+
+    def coarse(self, cells: np.ndarray, group: np.ndarray) -> Rows:
+        """As of `Engine`."""
+        return left_by_nodes(self._rough, cells, group)
+
+    def narrow(self, rows: Rows, step: int) -> Rows:
+        """As of `Engine`."""
+        return narrowed(self._rough, self.model, rows, step)
 
     def unknown(self, block: np.ndarray) -> Part:
         """As of `Engine`."""

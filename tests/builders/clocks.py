@@ -1,7 +1,7 @@
 """Time that passes only where a test wants it to."""
 
 from viewcell.solvers.visibility.portal_engine import PortalEngine
-from viewcell.workbench.bake import blocks, budget, run
+from viewcell.workbench.bake import blocks, budget, coarse, run
 
 
 class Clock:
@@ -22,4 +22,9 @@ class Clock:
         monkeypatch.setattr(blocks, "VIEW_BLOCK", 1)
         monkeypatch.setattr(blocks, "time", stopped)
         monkeypatch.setattr(budget, "time", stopped)
+        monkeypatch.setattr(coarse, "time", stopped)
         monkeypatch.setattr(run, "time", stopped)
+
+    def wait(self, seconds):
+        """Let so much pass."""
+        self.now += seconds

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 import trimesh
 from builders import random_solids
+from shapely.geometry import Polygon
 from viewcell.data import curtains
 from viewcell.data.curtains import FALLING, clearly_missed, crossed, find_curtains, meeting
 from viewcell.data.prepared import PreparedModel
 from viewcell.data.scene import GRID_M
+from viewcell.data.solids import rays_wind, winding_numbers
 from viewcell.verify.proofs.curtain import is_opaque
 from viewcell.verify.proofs.opaque import OpaqueSurfaces
 
@@ -184,3 +186,45 @@ def test_what_is_clearly_missed_is_not_crossed():
             assert not (said and met)
             missed, clear = missed + (not met), clear + said
     assert clear > 0.6 * missed > 2000
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_above_a_point_tells_whether_it_is_inside(seed):
+    """Against solid angles, on a coarse grid: many points lie in line with corners, and some on surfaces."""
+    random = np.random.default_rng(seed)
+    mesh = [trimesh.creation.box((6, 5, 7)), trimesh.creation.icosphere(1, 5), trimesh.creation.cylinder(4, 8, 6)][
+        seed % 3
+    ]
+    mesh.apply_transform(trimesh.transformations.random_rotation_matrix(random.random(3)) if seed > 2 else np.eye(4))
+    triangles = np.round(mesh.triangles).astype(np.int32)
+    doubled = random.integers(-14, 15, (400, 3))
+    row = np.repeat(np.arange(400), len(triangles))
+    told = rays_wind(doubled, row, np.tile(triangles, (400, 1, 1)))
+    number = winding_numbers(doubled / 2, triangles)
+    clear = np.abs(number - np.round(number)) < 1e-6
+    on = np.zeros(400, bool)
+    for step in np.vstack([np.eye(3), -np.eye(3)]) * 1e-4:
+        on |= np.abs(winding_numbers(doubled / 2 + step, triangles) - number) > 1e-3
+    assert (
+        (told == (np.abs(number) > 0.5))[clear & ~on].all()
+        and (clear & ~on & told).sum() > 10
+        and (clear & ~on & ~told).sum() > 10
+    )
+    # An inside that is turned out is one as well.
+    assert (rays_wind(doubled, row, np.tile(triangles[:, ::-1], (400, 1, 1))) == told)[clear & ~on].all()
+
+
+@pytest.mark.parametrize("yaw", [-25, 25])
+def test_what_reaches_over_gaps_is_not_opaque_though_its_middle_is_inside(yaw):
+    """A comb of three teeth: from tooth to tooth, and within one, rising and falling."""
+    teeth = [(0, 0), (5, 0), (5, 2), (4, 2), (4, 1), (3, 1), (3, 2), (2, 2), (2, 1), (1, 1), (1, 2), (0, 2)]
+    comb = trimesh.creation.extrude_polygon(Polygon(teeth), 2.0)
+    turn = trimesh.transformations.rotation_matrix(np.radians(yaw), [0, 0, 1])
+    triangles = np.round(comb.apply_transform(turn).triangles * 1000).astype(np.int32)
+    ends = np.array([[(0.2, 1.5), (4.8, 1.5)], [(2.1, 1.5), (2.9, 1.5)]])
+    ends = np.concatenate([ends, np.full((2, 2, 1), 1.0)], axis=2).reshape(-1, 3)
+    plan = np.round(trimesh.transform_points(ends, turn)[:, :2] * 1000).reshape(2, 2, 2)
+    quads = np.concatenate([plan, np.full((2, 2, 1), [[500], [1500]])], axis=2).astype(np.int64)
+    assert (np.diff(quads[:, :, 1], axis=1) > 0).all() == (yaw > 0)
+    owner, left = curtains._opaque(quads, np.zeros(2, np.int64), [triangles])
+    assert owner.tolist() == [0] and left.tolist() == quads[1:].tolist()

@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+import trimesh
 from builders import random_solids, small_house
 from viewcell.data import prepared
 from viewcell.data.buildings.arcade import ARCH_M, BAY_M, SPRING_M, make_arcade
@@ -158,3 +159,16 @@ def test_an_empty_scene_can_be_prepared():
     model = PreparedModel(Scene([], []))
     assert len(model.regions.boxes) == len(model.patches.area) == len(model.outlines.area) == len(model.closed) == 0
     assert len(model.occludees.pieces) == 0
+
+
+def test_curtains_that_take_too_long_are_not_made():
+    """Two walls at an angle in two lots: not in no time, and once in any."""
+    walls = [random_solids.box([0, 0, 0], [size, 0.4, 3]) for size in (4, 5)]
+    for wall in walls:
+        wall.apply_transform(trimesh.transformations.rotation_matrix(0.5, [0, 0, 1]))
+    model = PreparedModel(random_solids.scene_of_meshes(walls))
+    assert not model.make_curtains(0.0) and not model.make_curtains(-1.0)
+    assert model.make_curtains(1e6) and model.make_curtains(0.0)
+    made = model.curtains
+    assert len(made.boxes) > 0 and made is model.curtains
+    assert made.boxes.tolist() == PreparedModel(model.scene).curtains.boxes.tolist()

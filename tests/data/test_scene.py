@@ -105,3 +105,11 @@ def test_an_object_may_have_a_shape_of_its_own_at_some_levels():
     for lod in (-1, 3):
         with pytest.raises(InputError, match=f"object 1: expected a level below 3, found {lod}"):
             scene.with_own_geometry(1, {lod: own})
+
+
+def test_boxes_of_objects_are_the_callers_own():
+    scene = scene_of([0, 0, 0], [1, 0, 0], [0, 1, 2], faces=[[0, 1, 2]])
+    scene.object_bounds()[:] = 7
+    assert (scene.object_bounds() * GRID_M).tolist() == [[[0, 0, 0], [1, 1, 2]]]
+    scene.bounds()[:] = 7
+    assert (scene.bounds() * GRID_M).tolist() == [[0, 0, 0], [1, 1, 2]]

@@ -100,6 +100,7 @@ def test_few_lines_hide_nothing_more(work, cap, known, models, monkeypatch):
     monkeypatch.setattr(graph_engine, "launch_flood", lambda *a, **o: launch_flood(*a, **(o | {"cap": cap})))
     engine = engine_of(work, models)
     if "view cells" in work[1]:
+        engine.prepare()
         engine.model = replace(engine.model, cap=cap)
     elif "portals" in work[1]:
         engine.__dict__["occluders"] = replace(engine.occluders, cap=cap)

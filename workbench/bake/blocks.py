@@ -226,6 +226,7 @@ def refine(
     model, engine = sources.model, work.engine
     sizes, cells = model.scene.triangle_counts, sources.graph.cells
     kept, leaves, short = [], [], None
+    ready = engine.prepare(work.deadline - time.perf_counter())
     for level in range(1, settings.depth + 2):
         coarse = np.zeros(len(cells), bool)
         if level <= settings.depth:
@@ -239,7 +240,7 @@ def refine(
         work.bar.grow(int(alive.sum()))
         for begin in range(0, len(parents), work.width):
             sizes_now = alive[begin : begin + work.width].sum(axis=1)
-            if not rate.fits(len(sizes_now), work.deadline):
+            if not rate.fits(len(sizes_now), work.deadline) or not ready:
                 # What is left of this level stays as it is: unrefined, never hidden.
                 coarse[parents[begin:]] = False
                 short = _unrefined(work, parts, parents[begin:], rate)

@@ -1,22 +1,19 @@
 """A bake within a budget: something sound for every view cell first, then what tells most per second.
 
 First what is seen at a glance. Then small pieces of the first blocks tell how long a bake takes: where there is time
-for all of it, that is done. Where there is none even to hide from all, occluders hide from groups of neighbouring view
-cells, one proof for all of a group, then from single ones, those first that keep most. What time is left hides as a
-bake does, then finds witnesses.
+for all of it, that is done. Where there is none even to hide from all, occluders hide from every view cell, coarsely at
+first (workbench/bake/coarse.py). What time is left hides as a bake does, then finds witnesses.
 Everything that is not proved hidden by then is kept, and is unknown where it was not seen.
 """
 
 import time
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...data.hierarchy import leaves_of
 from ...data.rows import Rows
 from .blocks import Rate, Shortfall, Work
+from .coarse import Coarse
 
 if TYPE_CHECKING:
     from ...solvers.visibility.engine import Part
@@ -24,15 +21,14 @@ if TYPE_CHECKING:
 # Looks around from every view cell before anything else: share of the time at most, number at most, and the share by
 # which a look has to add to what is seen for there to be another.
 GLANCE, GLANCES, GLANCE_LEAST = 0.05, 16, 0.02
-# View cells in the smallest groups; share of the time that groups may take; groups done at a time by a thread; and how
-# many times faster per cell than hiding as a bake does it has to be: walls alone are slow inside buildings.
-GROUP, GROUPS_SHARE, TOGETHER, FASTER = 8, 0.3, 8, 2.0
 # Looking for witnesses takes so many times as long as telling what is hidden, where it was not measured.
 GUESSED = 2.0
 # Whether there is time for all is measured, if by that guess there is so large a part of it.
 HOPE = 4.0
 # View cells of the first blocks that tell how long others take.
 PROBE = 4
+# Share of what time is left that preparing to hide as a bake does may take.
+PREPARING = 0.25
 
 
 def within_budget(
@@ -54,16 +50,20 @@ def within_budget(
             work.bar.update(len(block))
     stored, hiding = set(done), Rate()
     left = _pieces([(number, block) for number, block in enumerate(blocks) if number not in stored], work.width)
-    coarse = _Coarse(work, glances, np.concatenate([np.zeros(0, int), *(cells for _, cells in left)]), boxes, volumes)
+    coarse = Coarse(work, glances, np.concatenate([np.zeros(0, int), *(cells for _, cells in left)]), boxes, volumes)
     full, begun = Rate(), 0.0
+    ready = work.engine.prepare(0.0)
     if left and hiding.fits(1, work.deadline):
         coarse.begin()
         begun = time.perf_counter() - work.started
-        left = _finish_directly(work, blocks, left, (hiding, full), done)
+        if coarse.first() and not ready:
+            ready = work.engine.prepare(PREPARING * (work.deadline - time.perf_counter()))
+        if ready:
+            left = _finish_directly(work, blocks, left, (hiding, full), done)
     while left:
-        if not hiding.fits(_cells(left), work.deadline):
+        if not ready or not hiding.fits(_cells(left), work.deadline):
             coarse.run(hiding)
-        if not hiding.fits(_cells(now := left[: work.width]), work.deadline):
+        if not ready or not hiding.fits(_cells(now := left[: work.width]), work.deadline):
             break
         del left[: work.width]
         for (number, _), part in zip(now, _hide(work, hiding, [cells for _, cells in now]), strict=True):
@@ -173,97 +173,3 @@ def _glance(work: Work, blocks: list[np.ndarray]) -> Rows:
         if left or len(found) - before <= GLANCE_LEAST * before:
             break
     return found
-
-
-@dataclass
-class _Coarse:
-    """What some view cells may see by occluders alone, from coarse groups to single ones; at first everything.
-
-    Attributes:
-        work: on its way.
-        glances: pairs known to be seen.
-        cells: view cells, shape (n,), int.
-        boxes: of all cells.
-        volumes: likewise.
-        able: whether the engine can tell.
-        kept: whether cells[i] may see object j, shape (n, objects), bool; None before `run`.
-    """
-
-    work: Work
-    glances: Rows
-    cells: np.ndarray
-    boxes: np.ndarray
-    volumes: np.ndarray
-    able: bool = False
-    kept: np.ndarray | None = None
-
-    def begin(self) -> None:
-        """Ask about one cell: that makes what all others, and hiding as a bake does, use as well."""
-        self.able = self.work.engine.coarse(self.cells[:1], np.zeros(1, int), self.glances) is not None
-
-    def run(self, hiding: Rate) -> None:
-        """Hide as much as there is time for, once, where that is so many times faster than hiding as a bake does."""
-        if self.kept is not None or not self.able:
-            return
-        self.kept = np.ones((len(self.cells), self.work.objects), bool)
-        depth = max(0, int(np.ceil(np.log2(len(self.cells) / GROUP))))
-        group, rate = self._cut(depth), self._timed(depth)
-        if rate.each * 2**depth < hiding.each * len(self.cells) / FASTER:
-            share = GROUPS_SHARE * (self.work.deadline - time.perf_counter())
-            more = 2**depth * rate.each / max(share, 1e-9)
-            if more > 1.0:
-                group = self._cut(max(0, depth - int(np.ceil(np.log2(more)))))
-            self._hide(group, rate, self.volumes[self.cells])
-        rate = self._timed(int(np.log2(len(self.cells))))
-        if rate.each < hiding.each / FASTER:
-            self._hide(np.arange(len(self.cells)), rate, self.kept.sum(axis=1) * self.volumes[self.cells])
-
-    def left(self, rows: Rows) -> Rows:
-        """Those of some rows that are not hidden."""
-        if self.kept is None:
-            return rows
-        return rows.take(self.kept[self._places[rows.source], rows.target])
-
-    @cached_property
-    def _places(self) -> np.ndarray:
-        """Place of each of all cells among these."""
-        places = np.full(len(self.boxes), -1)
-        places[self.cells] = np.arange(len(self.cells))
-        return places
-
-    def _timed(self, depth: int) -> Rate:
-        """What a few groups take of cells that are halved so many times."""
-        group, rate = self._cut(depth), Rate()
-        few = np.arange(int(group.max()) + 1)[:: max(1, 2**depth // self.work.width)]
-        rate.take(len(few), lambda: self._ask(group, few))
-        return rate
-
-    def _cut(self, depth: int) -> np.ndarray:
-        """Group of each cell, of neighbours, halved so many times; shape (n,), int."""
-        return np.unique(leaves_of(self.boxes[self.cells], depth), return_inverse=True)[1]
-
-    def _ask(self, group: np.ndarray, some: np.ndarray) -> list[Rows]:
-        """What some groups of the cells may see, side by side."""
-
-        def ask(mine: np.ndarray) -> Rows:
-            rows = np.flatnonzero(np.isin(group, mine))
-            own = np.unique(group[rows], return_inverse=True)[1]
-            return self.work.engine.coarse(self.cells[rows], own, self.glances)
-
-        shares = [some[k :: self.work.width] for k in range(min(self.work.width, len(some)))]
-        return self.work.each(ask, shares, [0] * len(shares))
-
-    def _hide(self, group: np.ndarray, rate: Rate, worth: np.ndarray) -> None:
-        """Hide from groups of cells, those first that are worth most, while there is time."""
-        order = np.argsort(-np.bincount(group, worth), kind="stable")
-        step = TOGETHER * self.work.width
-        for begin in range(0, len(order), step):
-            some = order[begin : begin + step]
-            if not rate.fits(len(some), self.work.deadline):
-                return
-            found = Rows.join(rate.take(len(some), lambda some=some: self._ask(group, some)))
-            mine = np.flatnonzero(np.isin(group, some))
-            left = np.zeros((len(mine), self.kept.shape[1]), bool)
-            left[np.searchsorted(mine, self._places[found.source]), found.target] = True
-            self.kept[mine] &= left
-            self.work.bar.note = f"{self.kept.mean():.0%} of the objects kept"

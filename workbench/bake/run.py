@@ -287,6 +287,8 @@ def _visibility(
     started = time.perf_counter()
     clock.show("prepare")
     engine = engine_of(sources, settings, run.device)
+    if run.budget_s is None:
+        engine.prepare()
     clock.lap("prepare")
     compiled = time.perf_counter()
     clock.show("compile")

@@ -5,7 +5,9 @@ import pytest
 import viewcell
 from builders.clocks import Clock
 from viewcell.data.buildings.office import make_office
+from viewcell.data.prepared import PreparedModel
 from viewcell.solvers.visibility.portal_engine import PortalEngine
+from viewcell.solvers.visibility.view_cell_engine import ViewCellEngine
 from viewcell.workbench.bake import budget
 
 
@@ -45,39 +47,40 @@ def test_every_cell_has_a_set_where_only_one_block_is_hidden(office, whole, tmp_
 
 
 def test_groups_alone_hide_something(office, whole, tmp_path, slow, monkeypatch):
-    """Time ends after them: what one cell of a group keeps, all others of it keep."""
-    hide, groups = budget._Coarse._hide, []
+    """There is time for a few groups and for nothing else: all cells of one keep the same but those asked alone."""
+    groups, left = [], PortalEngine.coarse
 
-    def first_only(self, group, rate, worth):
-        if not groups:
-            hide(self, group, rate, worth)
-            for mine in range(group.max() + 1):
-                assert len(np.unique(self.kept[group == mine], axis=0)) == 1
-        groups.append(group)
+    def timed(engine, cells, group):
+        slow.now += 10.0 * len(np.unique(group))
+        groups.append((cells, group))
+        return left(engine, cells, group)
 
-    monkeypatch.setattr(budget, "GROUP", 3)
-    monkeypatch.setattr(budget._Coarse, "_hide", first_only)
-    made = viewcell.bake(office, tmp_path / "a", budget_s=100.0, threads=1)
-    assert 1 < groups[0].max() + 1 < len(groups[0])
+    monkeypatch.setattr(PortalEngine, "coarse", timed)
+    monkeypatch.setattr(PortalEngine, "narrow", lambda engine, rows, step: slow.wait(1e6) or rows)
+    made = viewcell.bake(office, tmp_path / "a", budget_s=150.0, threads=1)
+    alone = np.concatenate([cells for cells, group in groups if group.max() + 1 == len(group)])
+    together = [(cells, group) for cells, group in groups if group.max() + 1 < len(group)]
+    assert together and kept(whole).sum() < kept(made).sum() < kept(made).size
+    for cells, group in together:
+        for mine in range(group.max() + 1):
+            assert len(np.unique(made.potential_objects[np.setdiff1d(cells[group == mine], alone)], axis=0)) <= 1
     assert (kept(made) >= seen(whole)).all()
-    assert kept(whole).sum() < kept(made).sum() < kept(made).size
 
 
 def test_occluders_are_not_asked_where_they_are_slow(office, tmp_path, slow, monkeypatch):
-    """An ask takes longer than hiding from a cell, whether of a group or of a cell: a few are tried, and no more."""
-    asked, coarse = [], PortalEngine.coarse
+    """A step takes longer than hiding from a cell: a few cells are tried, and no more."""
+    asked, narrow = [], PortalEngine.narrow
 
-    def timed(engine, cells, group, known):
-        slow.now += 4.0 * len(cells)
-        asked.append(len(cells))
-        return coarse(engine, cells, group, known)
+    def timed(engine, rows, step):
+        slow.now += 3.0 * len(np.unique(rows.source))
+        asked.append((step, len(np.unique(rows.source))))
+        return narrow(engine, rows, step)
 
     slow.seconds |= {False: 6.0, True: 6.0}
-    monkeypatch.setattr(PortalEngine, "coarse", timed)
-    monkeypatch.setattr(budget, "GROUP", 3)
-    made = viewcell.bake(office, tmp_path / "a", budget_s=50.0, threads=1)
-    assert len(asked) == 3 and slow.calls.count(False) >= 2
-    assert kept(made).sum(axis=1).max() == kept(made).shape[1]
+    monkeypatch.setattr(PortalEngine, "narrow", timed)
+    made = viewcell.bake(office, tmp_path / "a", budget_s=80.0, threads=1)
+    assert len(asked) == 2 and asked[0] == asked[1] and slow.calls.count(False) >= 2
+    assert asked[0][1] < kept(made).shape[0] / 2
 
 
 def test_what_engines_cannot_group_is_kept(office, whole, tmp_path, slow):
@@ -87,11 +90,29 @@ def test_what_engines_cannot_group_is_kept(office, whole, tmp_path, slow):
     assert (kept(made) >= seen(whole)).all()
 
 
-def test_an_engine_with_time_asks_no_groups(office, tmp_path, monkeypatch):
-    asked, coarse = [], PortalEngine.coarse
-    monkeypatch.setattr(PortalEngine, "coarse", lambda *a: asked.append(a[1:3]) or coarse(*a))
+def test_with_time_nothing_is_asked_about_pieces(office, tmp_path, monkeypatch):
+    """Whole objects take little beside all else."""
+    asked, narrow = [], PortalEngine.narrow
+    monkeypatch.setattr(PortalEngine, "narrow", lambda *a: asked.append(a[2]) or narrow(*a))
     assert viewcell.bake(office, tmp_path / "a", budget_s=600.0).manifest["budget_spent"] is False
-    assert [(len(cells), len(group)) for cells, group in asked] == [(1, 1)]
+    assert set(asked) == {0}
+
+
+@pytest.mark.parametrize("made_in_time", [True, False])
+def test_what_takes_long_to_prepare_is_made_where_there_is_time(office, tmp_path, monkeypatch, made_in_time):
+    """Else strong rectangles hide, and the budget ends with that."""
+    Clock(monkeypatch, {False: 5.0, True: 5.0}, ViewCellEngine)
+    monkeypatch.setattr(
+        PreparedModel, "make_curtains", lambda model, seconds: seconds > (20.0 if made_in_time else 30.0)
+    )
+    table = tmp_path / "cells.csv"
+    table.write_text("min_x,min_y,min_z,max_x,max_y,max_z\n1,1,0.3,2,2,1.3\n3,2.5,0.4,4.5,3.5,1.6\n")
+    settings = {"method": "occluders", "cells": str(table)}
+    short = viewcell.bake(office, tmp_path / "a", budget_s=100.0, threads=1, **settings)
+    assert ("budget" in short.manifest) is not made_in_time
+    full = viewcell.bake(office, tmp_path / "b", **settings)
+    assert (short.potential_objects >= seen(full)).all()
+    assert full.potential_objects.sum() <= short.potential_objects.sum() < 0.7 * short.potential_objects.size
 
 
 def test_the_first_pieces_are_small():
