@@ -2,9 +2,12 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
+PAGE := workbench/view/page
+VIEWER := $(PAGE)/build/viewer.js
+
 .PHONY: install run test test-slow mutants lint docs clean
 
-install: .venv/installed
+install: .venv/installed $(VIEWER)
 
 .venv/installed: requirements.lock pyproject.toml
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'viewcell needs Python 3.11 or newer, found ' + sys.version.split()[0])"
@@ -15,6 +18,10 @@ install: .venv/installed
 	mkdir -p .venv/src && ln -sfn "$(CURDIR)" .venv/src/viewcell
 	echo "$(CURDIR)/.venv/src" > "$$($(BIN)/python -c 'import site; print(site.getsitepackages()[0])')/viewcell_source.pth"
 	touch $@
+
+# The viewer's script, with three.js from npm; where that cannot be reached, all but `viewcell view` works.
+$(VIEWER): .venv/installed $(wildcard $(PAGE)/*.mjs) $(PAGE)/package-lock.json
+	-$(BIN)/python -m viewcell.workbench.view.build
 
 run: install
 	$(BIN)/viewcell make office --out out/office.scene --overwrite

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ..data.store.walk_folder import WalkFolder
     from ..verify.findings import VerifyResult
     from .export.run import Kind
+    from .view.run import View
 
 
 @dataclass(frozen=True)
@@ -153,6 +154,12 @@ class Bake(BakeFolder):
         from .report.run import report
 
         return report(self, cells=cells, out=out, curves=curves)
+
+    def view(self, out: str | Path | None = None, *, overwrite: bool = False) -> "View":
+        """Write a folder in which one walks through the bake in a browser; as `viewcell.view`."""
+        from .view.run import view
+
+        return view(self, out, overwrite=overwrite)
 
     def pack(self, out: str | Path | None = None, *, flatten: bool = False, overwrite: bool = False) -> "WalkFolder":
         """Write the display database that a walkthrough reads; as `viewcell.pack`."""

@@ -438,6 +438,17 @@ def export(options: argparse.Namespace) -> int:
     return 0
 
 
+def view(options: argparse.Namespace) -> int:
+    """Write a view, say where it is, and open it where somebody sits at a terminal."""
+    from .view.run import view as write
+
+    made = write(options.source, options.out, overwrite=options.overwrite)
+    say(str(made.page))
+    if not options.no_open and sys.stdout.isatty():
+        made.open()
+    return 0
+
+
 def pack(options: argparse.Namespace) -> int:
     """Write a display database and say how large it is, or check one."""
     from .pack.words import pack_text

@@ -11,6 +11,8 @@ ELSE = {
     "workbench/bake/test_levels.py": "levels of detail through a whole bake",
     "workbench/report/test_in_browser.py": "the page as a person uses it",
     "workbench/report/test_page_modules.py": "runs the modules' own tests in Node",
+    "workbench/view/test_in_browser.py": "the view as a person uses it",
+    "workbench/view/test_page_modules.py": "runs the modules' own tests in Node",
 }
 TESTS = [
     path.relative_to(ROOT / "tests") for floor in FLOORS for path in sorted((ROOT / "tests" / floor).rglob("test_*.py"))

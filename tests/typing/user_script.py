@@ -37,6 +37,7 @@ def judged(bake: Bake, scene: Scene, claimed: np.ndarray) -> bool:
     """Whether a bake, and somebody else's sets, stand."""
     found = bake.verify(rays=100_000, seed=1)
     page: Path = bake.report(cells=[0, 1])
+    print(viewcell.view(bake, overwrite=True).page, bake.view("view").page)
     result = viewcell.check(scene, claimed, bake, rays=10_000, targets="objects")
     viewcell.assert_conservative(claimed, scene, bake, rays=10_000)
     print(found.table(), page, result.table(10), viewcell.inspect(scene).text())

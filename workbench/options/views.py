@@ -87,6 +87,21 @@ def add_export(commands: argparse._SubParsersAction) -> None:
     export.add_argument("--overwrite", action="store_true", help="replace what is there")
 
 
+def add_view(commands: argparse._SubParsersAction) -> None:
+    """`viewcell view`."""
+    view = command(
+        commands,
+        "view",
+        "view",
+        "Write a folder in which one walks through a bake, from inside and from above, in any browser.",
+        ["view house.bake", "view house.walk -o page --no-open"],
+    )
+    view.add_argument("source", metavar="BAKE", help="bake folder of a model, or a display database of pack")
+    view.add_argument("-o", "--out", metavar="FOLDER", help="folder to write; BAKE's name with .view by default")
+    view.add_argument("--overwrite", action="store_true", help="replace a view that is there")
+    view.add_argument("--no-open", action="store_true", help="do not open it in a browser")
+
+
 def add_pack(commands: argparse._SubParsersAction) -> None:
     """`viewcell pack`."""
     pack = command(

@@ -1,11 +1,10 @@
 """The page in a browser: what a click asks for is shown."""
 
-import os
-import shutil
 import time
 
 import numpy as np
 import pytest
+from builders.chromium import chromium
 from builders.seen_house import CURVES, views_only, with_rooms
 from viewcell.workbench.curves.series import Curves
 from viewcell.workbench.report.web_page import page
@@ -14,25 +13,7 @@ from viewcell.workbench.report.web_page import page
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     """Headless Chromium with a profile of its own."""
-    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
-    # Where CI has found a browser nothing excuses not to use it.
-    if not os.environ.get("VIEWCELL_BROWSER"):
-        pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-        if not (chromium and driver):
-            pytest.skip("no chromium and chromedriver found")
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    flags = "headless=new no-sandbox disable-gpu disable-quic no-first-run disable-background-networking"
-    flags += " disable-component-update disable-sync window-size=1400,1000 force-device-scale-factor=1"
-    for flag in [*flags.split(), f"user-data-dir={tmp_path_factory.mktemp('chromium')}"]:
-        options.add_argument(f"--{flag}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    found = webdriver.Chrome(options=options, service=Service(driver))
-    yield found
-    found.quit()
+    yield from chromium(tmp_path_factory.mktemp("chromium"), "disable-gpu")
 
 
 class Page:

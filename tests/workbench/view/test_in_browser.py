@@ -1,0 +1,229 @@
+"""The viewer in a browser: what it says and draws is what the bake says."""
+
+import base64
+import functools
+import http.server
+import io
+import shutil
+import threading
+import time
+
+import numpy as np
+import pytest
+from builders.chromium import chromium
+from viewcell.workbench.view.run import view
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    """Headless Chromium that draws WebGL on the processor."""
+    profile = tmp_path_factory.mktemp("chromium")
+    yield from chromium(profile, "use-angle=swiftshader", "enable-unsafe-swiftshader", "ignore-gpu-blocklist")
+
+
+@pytest.fixture(scope="module")
+def folder(walk, built, tmp_path_factory):
+    return view(walk, tmp_path_factory.mktemp("view") / "office.view").page.parent
+
+
+class Shown:
+    """A view that is open in a browser."""
+
+    def __init__(self, browser, address):
+        self.browser = browser
+        browser.get_log("browser")
+        browser.get(f"{address}?{time.monotonic_ns()}")
+        self.until("return document.documentElement.dataset.ready || document.documentElement.dataset.failed")
+
+    def run(self, script, *arguments):
+        return self.browser.execute_script(script, *arguments)
+
+    def until(self, script, seconds=60):
+        deadline = time.monotonic() + seconds
+        while not (found := self.run(script)) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        assert found, script
+
+    def choose(self, name, value):
+        """Choose something, and wait until it is drawn."""
+        frames = self.run("return viewer.frames ?? 0")
+        self.run("viewer.choose(arguments[0], arguments[1])", name, value)
+        self.until(f"return viewer.frames > {frames} && viewer.cell === viewer.visitor.cell")
+
+    def picture(self, yaw):
+        """What is seen from inside in a direction, shape (height, width, 3), int."""
+        from PIL import Image
+
+        # Drawn and read at once: a picture of the page may be of the frame before.
+        drawn = self.run(
+            "viewer.visitor.yaw = arguments[0];"
+            "if (viewer.cell !== viewer.visitor.cell) viewer.enter();"
+            "viewer.stage.draw(viewer.visitor, viewer.chosen.view, viewer.chosen.height);"
+            "return viewer.canvas.toDataURL('image/png')",
+            yaw,
+        )
+        data = base64.b64decode(drawn.partition(",")[2])
+        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
+
+    def complaints(self):
+        return [entry["message"] for entry in self.browser.get_log("browser") if entry["level"] == "SEVERE"]
+
+
+@pytest.fixture
+def shown(browser, folder):
+    return Shown(browser, (folder / "index.html").as_uri())
+
+
+def test_it_opens_by_a_double_click(shown, walk):
+    assert shown.run("return document.documentElement.dataset.ready") == "1"
+    assert shown.complaints() == []
+    start = shown.run("return viewer.database.cellIds[viewer.visitor.cell]")
+    row = walk.row_of(start)
+    here = len(walk.potential.of(row))
+    assert shown.run("return viewer.counts") == {"drawn": here, "potential": here, "objects": walk.objects.num_rows}
+    text = shown.run("return document.getElementById('drawn').textContent")
+    assert text.startswith(f"{here:,} drawn, {here:,} potential ({len(walk.unknown.of(row))} unknown)")
+
+
+def test_every_view_cell_has_the_sets_of_the_bake(shown, walk, office):
+    found = shown.run(
+        "const d = viewer.database; return [...d.viewCells].map((cell) => "
+        "[d.cellIds[cell], d.setOf(cell).potential, [...d.setOf(cell).unknown], "
+        "d.cellsOf(cell).map((one) => d.cellIds[one])])"
+    )
+    ids = walk.objects["object_id"].to_numpy()
+    assert sorted(cell for cell, *_ in found) == np.flatnonzero(office.graph.inhabitable).tolist()
+    for cell, potential, unknown, cells in found:
+        assert sorted(ids[potential]) == office.potential(cell).tolist()
+        assert sorted(ids[unknown]) == office.unknown(cell).tolist()
+        assert sorted(cells) == np.flatnonzero(office.cell_sets[cell]).tolist()
+
+
+@pytest.mark.slow
+def test_the_set_draws_what_the_whole_model_draws(shown):
+    """From several eyes and directions: but for cracks where members abut, through which only the whole model shows."""
+    shown.choose("view", "inside")
+    cells = shown.run("return [...viewer.database.viewCells]")
+    differing = pixels = 0
+    for cell in cells[::3]:
+        shown.choose("cell", cell)
+        pictures = {}
+        for mode in ("set", "whole"):
+            shown.choose("mode", mode)
+            pictures[mode] = [shown.picture(yaw) for yaw in (0.3, 2.4)]
+        for some, every in zip(pictures["set"], pictures["whole"], strict=True):
+            assert np.ptp(every, axis=(0, 1)).max() > 10, "nothing is drawn"
+            differing += int((np.abs(some - every).max(axis=2) > 8).sum())
+            pixels += some.shape[0] * some.shape[1]
+        shown.choose("mode", "set")
+    assert pixels > 10**6 and differing < 1e-4 * pixels, (differing, pixels)
+
+
+def test_a_set_that_lacks_a_wall_is_seen_to(shown):
+    """The comparison above is one that can fail."""
+    shown.choose("view", "inside")
+    whole = shown.picture(0.3)
+    walls = "[...viewer.database.head.names.keys()].filter((id) => /wall/i.test(viewer.database.head.names[id]))"
+    shown.run(f"for (const id of {walls}) viewer.stage.inside.shown[id] = 1;")
+    shown.run(f"const left = viewer.stage.inside.shown.slice(); for (const id of {walls}) left[id] = 0;"
+              "viewer.stage.inside.show(left);")  # fmt: skip
+    assert (np.abs(shown.picture(0.3) - whole).max(axis=2) > 8).mean() > 0.01
+
+
+def test_walls_stop_and_doors_do_not(shown, office):
+    """From the middle of each room in eight directions: nobody comes to where there is no way through portals."""
+    found = shown.run(
+        """
+        const { visitor, database } = viewer;
+        const out = [];
+        for (const cell of database.viewCells) {
+          for (let k = 0; k < 8; k++) {
+            visitor.goTo(cell);
+            visitor.yaw = (k * Math.PI) / 4 + 0.1;
+            const met = new Set([cell]);
+            for (let n = 0; n < 80; n++) { visitor.walk(0.1, 1, 0, 1.6); met.add(visitor.cell); }
+            out.push([visitor.point, database.cellIds[visitor.cell], [...met].map((one) => database.cellIds[one])]);
+          }
+        }
+        return out;
+        """
+    )
+    links = {frozenset(pair) for pair in office.graph.portal_cells.tolist()}
+    crossed = 0
+    for point, cell, met in found:
+        box = office.graph.cells[cell] * office.grid_m
+        assert (np.array(point) >= box[0] - 1e-6).all() and (np.array(point) <= box[1] + 1e-6).all()
+        for one in met:
+            assert one == met[0] or any(frozenset((one, other)) in links for other in met)
+        crossed += len(met) > 1
+        # Eyes are as high above the floor as eyes are, whatever furniture there is.
+        assert abs(point[2] - 1.65) < 0.02, point
+    assert crossed > 3
+
+
+def test_keys_walk_and_choose(shown):
+    from selenium.webdriver.common.keys import Keys
+
+    canvas = shown.browser.find_element("css selector", "body")
+    before = shown.run("return viewer.visitor.point.slice()")
+    shown.run("dispatchEvent(new KeyboardEvent('keydown', { code: 'KeyW' }))")
+    shown.until(
+        f"return Math.hypot(viewer.visitor.point[0] - {before[0]}, viewer.visitor.point[1] - {before[1]}) > 0.05"
+    )
+    shown.run("dispatchEvent(new KeyboardEvent('keyup', { code: 'KeyW' }))")
+    canvas.send_keys("v")
+    shown.until("return document.getElementById('view').value === 'above'")
+    canvas.send_keys("m")
+    shown.until(
+        "return document.getElementById('mode').value === 'whole' && viewer.counts.drawn === viewer.database.objects"
+    )
+    room = shown.browser.find_element("css selector", "#room")
+    name = shown.run("return viewer.database.rooms()[2].name")
+    room.send_keys(name + Keys.ENTER)
+    shown.until("return viewer.visitor.cell === viewer.database.rooms()[2].cell")
+    # What is typed into a field walks nowhere.
+    assert shown.run("return viewer.keys.down.size") == 0
+    room.clear()
+    room.send_keys("nowhere" + Keys.ENTER)
+    shown.until("return document.getElementById('note').textContent === 'no room is called nowhere'")
+
+
+def test_from_above_verdicts_have_colours(shown):
+    shown.choose("view", "above")
+    shown.choose("height", shown.run("return viewer.stage.bounds[5] - 0.6"))
+    coloured = shown.picture(0.0)
+    shown.choose("verdicts", False)
+    plain = shown.picture(0.0)
+    assert (np.abs(coloured - plain).max(axis=2) > 20).mean() > 0.05
+    shown.choose("outlines", True)
+    assert (np.abs(shown.picture(0.0) - plain).max(axis=2) > 20).mean() > 0.001
+    assert shown.complaints() == []
+
+
+def test_through_a_server(browser, folder):
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *_):
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=folder))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        shown = Shown(browser, f"http://127.0.0.1:{server.server_port}/index.html")
+        assert shown.run("return document.documentElement.dataset.ready") == "1"
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+@pytest.mark.parametrize("what", ["cut", "missing"])
+def test_what_cannot_be_read_is_said(browser, folder, tmp_path, what):
+    spoiled = tmp_path / "v"
+    shutil.copytree(folder, spoiled)
+    data = spoiled / "data.js"
+    if what == "missing":
+        data.unlink()
+    else:
+        head, _, packed = data.read_text().partition('"packed":"')
+        data.write_text(f'{head}"packed":"{packed[: len(packed) // 2 // 4 * 4]}"}};')
+    shown = Shown(browser, (spoiled / "index.html").as_uri())
+    assert shown.run("return document.getElementById('note').textContent").startswith("This view cannot be shown: ")

@@ -1,0 +1,143 @@
+// The viewer: walk through a display database, from inside and from above.
+
+import { Database } from "./database.mjs";
+import { Keys } from "./keys.mjs";
+import { Panel } from "./panel.mjs";
+import { Stage } from "./stage.mjs";
+import { arraysOf, unpacked } from "./unpack.mjs";
+import { Visitor } from "./visitor.mjs";
+
+const VIEWS = ["inside", "both", "above"];
+// Seconds that a frame may count for: what a hidden tab misses is not walked.
+const LONGEST = 0.1;
+
+class Viewer {
+  constructor(database) {
+    this.database = database;
+    this.visitor = new Visitor(database);
+    this.canvas = document.getElementById("canvas");
+    this.stage = new Stage(this.canvas, database);
+    this.chosen = { view: "both", mode: "set", verdicts: true, outlines: false };
+    const [low, high] = [this.stage.bounds[2], this.stage.bounds[5] + 0.1];
+    this.panel = new Panel(database.rooms(), [low, high], (name, value) => this.choose(name, value));
+    for (const [name, value] of Object.entries(this.chosen)) this.panel.set(name, value);
+    this.choose("height", this.storeyTop());
+    this.keys = new Keys(this.canvas, this.visitor, (code) => this.pressed(code));
+    this.canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.stage.zoom(Math.exp(event.deltaY * 0.001));
+      this.stale = true;
+    }, { passive: false });
+    const look = this.keys.look.bind(this.keys);
+    this.keys.look = (right, down) => (this.onSky ? this.stage.swing(right, down) : look(right, -down));
+    this.canvas.addEventListener("pointerdown", (event) => (this.onSky = this.isSky(event)));
+    addEventListener("resize", () => (this.stale = true));
+    const dark = matchMedia("(prefers-color-scheme: dark)");
+    const dress = () => {
+      this.stage.dress(dark.matches ? 0x10161b : 0xdfe9f1);
+      this.stale = true;
+    };
+    dark.addEventListener("change", dress);
+    dress();
+    this.times = [];
+    this.last = performance.now();
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  isSky(event) {
+    const { view } = this.chosen;
+    return view === "above" || (view === "both" && event.offsetX > this.canvas.clientWidth / 2);
+  }
+
+  /** Height at which the visitor's storey is cut open: a little below their cell's ceiling. */
+  storeyTop() {
+    const { cell, database, point } = { ...this.visitor, database: this.database };
+    return cell < 0 ? this.stage.bounds[5] + 0.1 : Math.max(point[2] + 0.1, database.cellBoxes[6 * cell + 5] - 0.35);
+  }
+
+  pressed(code) {
+    if (code === "KeyV") this.choose("view", VIEWS[(VIEWS.indexOf(this.chosen.view) + 1) % 3]);
+    if (code === "KeyM") this.choose("mode", this.chosen.mode === "set" ? "whole" : "set");
+    if (code === "KeyO") this.choose("outlines", !this.chosen.outlines);
+    if (code === "KeyC") this.choose("verdicts", !this.chosen.verdicts);
+  }
+
+  /** Take a choice: of the panel, a key, or a test. */
+  choose(name, value) {
+    if (name === "cell") {
+      this.visitor.goTo(value);
+      this.choose("height", this.storeyTop());
+    } else {
+      this.chosen[name] = name === "height" ? Number(value) : value;
+      this.panel.set(name, value);
+    }
+    this.cell = undefined;
+    this.stale = true;
+  }
+
+  /** Bring what is shown up to where the visitor is. */
+  enter() {
+    const { database, visitor, stage, chosen } = this;
+    const set = database.setOf(visitor.cell);
+    const potential = set ? set.potential : Array.from({ length: database.objects }, (_, id) => id);
+    const shown = new Uint8Array(database.objects).fill(chosen.mode === "set" ? 0 : 1);
+    for (const id of potential) shown[id] = 1;
+    const verdicts = new Array(database.objects).fill("hidden");
+    for (const id of potential) verdicts[id] = !set || set.unknown.has(id) ? "unknown" : "seen";
+    stage.show(shown, chosen.verdicts ? verdicts : null);
+    const cells = chosen.outlines ? (database.cellsOf(visitor.cell) ?? []) : [];
+    const near = new Set(cells);
+    const { sides, axes } = database.maze;
+    const portals = Array.from(axes, (_, k) => k).filter((k) => near.has(sides[2 * k]) && near.has(sides[2 * k + 1]));
+    stage.outline(visitor.cell, cells, portals);
+    const sum = (ids) => ids.reduce((all, id) => all + database.triangleCounts[id], 0);
+    const whole = database.triangleCounts.reduce((all, one) => all + one, 0);
+    const here = chosen.mode === "set" ? potential.length : database.objects;
+    const name = visitor.cell < 0 ? "outside all cells" : `cell ${database.cellIds[visitor.cell]} ${database.head.cellNames[visitor.cell]}`;
+    this.counts = { drawn: here, potential: potential.length, objects: database.objects };
+    this.panel.say({
+      cell: set ? name : `${name}: no view cell, so everything is kept`,
+      drawn: `${here.toLocaleString("en")} drawn, ${potential.length.toLocaleString("en")} potential (${set ? set.unknown.size : "all"} unknown), of ${database.objects.toLocaleString("en")}`,
+      triangles: `${(chosen.mode === "set" ? sum(potential) : whole).toLocaleString("en")} of ${whole.toLocaleString("en")}`,
+    });
+    this.cell = visitor.cell;
+  }
+
+  frame(now) {
+    const seconds = Math.min(LONGEST, (now - this.last) / 1000);
+    this.last = now;
+    const before = this.visitor.point.join();
+    const asked = this.keys.tick(seconds);
+    if (this.cell !== this.visitor.cell) {
+      if (this.cell !== undefined) this.choose("height", this.storeyTop());
+      this.enter();
+      this.stale = true;
+    }
+    const turned = `${this.visitor.yaw} ${this.visitor.pitch} ${JSON.stringify(this.stage.orbit)}`;
+    if (this.stale || asked || before !== this.visitor.point.join() || turned !== this.turned) {
+      const start = performance.now();
+      this.stage.draw(this.visitor, this.chosen.view, this.chosen.height);
+      this.times = [...this.times.slice(-29), performance.now() - start];
+      this.panel.say({ rate: `${(this.times.reduce((a, b) => a + b) / this.times.length).toFixed(1)} ms a frame on the processor` });
+      this.turned = turned;
+      this.stale = false;
+      this.frames = (this.frames ?? 0) + 1;
+    }
+    requestAnimationFrame((later) => this.frame(later));
+  }
+}
+
+async function start() {
+  try {
+    const { head, arrays, packed } = globalThis.viewcellData;
+    const database = new Database(head, arraysOf(arrays, await unpacked(packed)));
+    delete globalThis.viewcellData;
+    globalThis.viewer = new Viewer(database);
+    document.documentElement.dataset.ready = "1";
+  } catch (error) {
+    document.getElementById("note").textContent = `This view cannot be shown: ${error.message}`;
+    document.documentElement.dataset.failed = error.message;
+  }
+}
+
+start();

@@ -1,0 +1,136 @@
+// What is drawn: the model from inside and from above, each with a camera and layers of its own.
+
+import {
+  Color, DirectionalLight, HemisphereLight, MathUtils, Mesh, MeshBasicMaterial, PerspectiveCamera, Plane,
+  Scene, SphereGeometry, Vector3, WebGLRenderer,
+} from "three";
+
+import { Batch } from "./batch.mjs";
+import { VERDICTS, rgb } from "./colours.mjs";
+import { Lines, boxLines, portalBoxes } from "./outlines.mjs";
+
+export const [INSIDE, ABOVE] = [0, 1];
+const FOV = 75;
+// How far the eye's frustum is drawn [m].
+const REACH = 6;
+
+export class Stage {
+  constructor(canvas, database) {
+    this.database = database;
+    this.canvas = canvas;
+    this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    this.renderer.autoClear = false;
+    this.renderer.info.autoReset = false;
+    this.renderer.localClippingEnabled = true;
+    this.scene = new Scene();
+    this.bounds = database.head.bounds;
+    this.cut = new Plane(new Vector3(0, 0, -1), this.bounds[5] + 1);
+    this.inside = new Batch(database, INSIDE);
+    this.above = new Batch(database, ABOVE, [this.cut]);
+    this.scene.add(...this.inside.meshes, ...this.above.meshes);
+    this.eye = new PerspectiveCamera(FOV, 1, 0.05, 2 * this.size());
+    this.sky = new PerspectiveCamera(45, 1, 1, 8 * this.size());
+    this.eye.up.set(0, 0, 1);
+    this.sky.up.set(0, 0, 1);
+    this.eye.layers.set(INSIDE);
+    this.sky.layers.set(ABOVE);
+    this.orbit = { turn: -0.9, rise: 0.9, away: 1.15 * this.size() };
+    this.light();
+    this.head = new Mesh(new SphereGeometry(0.35), new MeshBasicMaterial({ color: 0xd55e00 }));
+    this.lines = { frustum: new Lines(0xd55e00, ABOVE), cell: new Lines(0xd55e00, ABOVE), cells: new Lines(0x0072b2, ABOVE, [this.cut]), portals: new Lines(0x007a58, ABOVE, [this.cut]) };
+    this.head.layers.set(ABOVE);
+    this.scene.add(this.head, ...Object.values(this.lines).map((one) => one.mesh));
+  }
+
+  size() {
+    const b = this.bounds;
+    return Math.max(10, Math.hypot(b[3] - b[0], b[4] - b[1], b[5] - b[2]));
+  }
+
+  light() {
+    const sky = new HemisphereLight(0xffffff, 0x8d8577, 2.2);
+    const sun = new DirectionalLight(0xffffff, 1.1);
+    sun.position.set(0.5, -0.7, 1.2);
+    for (const one of [sky, sun]) one.layers.enableAll();
+    this.scene.add(sky, sun);
+  }
+
+  /** Colours of what is behind everything. */
+  dress(paper) {
+    this.scene.background = new Color(paper);
+  }
+
+  /** Show a set from inside, an array of 0 and 1; and from above what is `seen`, `unknown` and `hidden`, if asked for. */
+  show(shown, verdicts) {
+    this.inside.show(shown);
+    this.above.paint(verdicts ? (id) => rgb(VERDICTS[verdicts[id]]) : () => null);
+  }
+
+  /** Lines around a cell, and, if asked for, cells that may be seen from it and all their portals. */
+  outline(cell, cells, portals) {
+    const { maze, cellBoxes } = this.database;
+    const boxes = (ids) => ids.flatMap((id) => [...cellBoxes.subarray(6 * id, 6 * id + 6)]);
+    this.lines.cell.set(boxLines(cell < 0 ? [] : boxes([cell])));
+    this.lines.cells.set(boxLines(boxes(cells)));
+    this.lines.portals.set(boxLines(portalBoxes(maze, portals)));
+  }
+
+  /** Draw what a visitor sees, and, below a height, where they are: `inside`, `above`, or `both`. */
+  draw(visitor, view, height) {
+    const { renderer, canvas, eye, sky, head } = this;
+    const [width, depth] = [canvas.clientWidth, canvas.clientHeight];
+    const ratio = Math.min(devicePixelRatio, 2);
+    if (canvas.width !== Math.floor(width * ratio) || canvas.height !== Math.floor(depth * ratio)) {
+      renderer.setPixelRatio(ratio);
+      renderer.setSize(width, depth, false);
+    }
+    this.cut.constant = height;
+    eye.position.set(...visitor.point);
+    eye.lookAt(...visitor.point.map((x, k) => x + visitor.ahead[k]));
+    head.position.copy(eye.position);
+    const { turn, rise, away } = this.orbit;
+    const middle = view === "both" ? visitor.point : [0, 1, 2].map((k) => (this.bounds[k] + this.bounds[k + 3]) / 2);
+    const far = view === "both" ? Math.min(away, 32) * (away / (1.15 * this.size())) : away;
+    sky.position.set(middle[0] + far * Math.cos(rise) * Math.cos(turn), middle[1] + far * Math.cos(rise) * Math.sin(turn), middle[2] + far * Math.sin(rise));
+    sky.lookAt(...middle);
+    renderer.info.reset();
+    renderer.setScissorTest(false);
+    renderer.clear();
+    const half = Math.floor(width / 2);
+    if (view !== "above") this.part(eye, 0, view === "both" ? half : width, depth);
+    if (view !== "inside") this.part(sky, view === "both" ? half : 0, view === "both" ? width - half : width, depth);
+  }
+
+  part(camera, left, width, depth) {
+    const { renderer } = this;
+    camera.aspect = width / depth;
+    camera.updateProjectionMatrix();
+    if (camera === this.eye) this.lines.frustum.set(this.frustum());
+    renderer.setViewport(left, 0, width, depth);
+    renderer.setScissor(left, 0, width, depth);
+    renderer.setScissorTest(true);
+    renderer.clear();
+    renderer.render(this.scene, camera);
+  }
+
+  /** Edges of what the eye's picture shows, as far as REACH, 6 numbers each. */
+  frustum() {
+    const { eye } = this;
+    eye.updateMatrixWorld();
+    const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([x, y]) =>
+      new Vector3(x, y, 0.5).unproject(eye).sub(eye.position).setLength(REACH).add(eye.position).toArray());
+    const middle = eye.position.toArray();
+    return new Float32Array(corners.flatMap((corner, k) => [...middle, ...corner, ...corner, ...corners[(k + 1) % 4]]));
+  }
+
+  /** Turn the view from above. */
+  swing(right, up) {
+    this.orbit.turn -= 0.006 * right;
+    this.orbit.rise = MathUtils.clamp(this.orbit.rise + 0.006 * up, 0.1, 1.5);
+  }
+
+  /** Come nearer, or go away. */
+  zoom(factor) {
+    this.orbit.away = MathUtils.clamp(this.orbit.away * factor, 4, 4 * this.size());
+  }
+}

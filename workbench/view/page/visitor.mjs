@@ -1,0 +1,78 @@
+// Who walks: where they are, where they look, which cell they are in.
+
+import { EYE, groundUnder } from "./ground.mjs";
+
+export const SPEED = 1.6; // metres a second, as people walk
+export const HURRY = 3;
+export const TURN = 1.8; // radians a second by arrow keys
+// How fast feet follow the ground [m/s]: stairs are no jumps.
+const CLIMB = 3;
+// A step is cut into pieces that are shorter than any wall is thick.
+const PIECE = 0.1;
+
+export class Visitor {
+  constructor(database) {
+    this.database = database;
+    this.yaw = this.pitch = 0;
+    this.goTo(busiest(database));
+  }
+
+  /** Stand in the middle of a cell, on its ground. */
+  goTo(cell) {
+    const { database } = this;
+    this.cell = cell;
+    const middle = database.middle(cell);
+    const floor = database.cellBoxes[6 * cell + 2];
+    const roof = database.cellBoxes[6 * cell + 5];
+    this.point = [middle[0], middle[1], Math.min(floor + EYE, (floor + roof) / 2 + 0.4 * (roof - floor))];
+    const ground = this.ground(this.point);
+    if (ground > floor - 0.5) this.point[2] = Math.min(ground + EYE, roof - 0.05);
+    // Along the longer side of the cell there is most to see.
+    const [width, depth] = [0, 1].map((axis) => database.cellBoxes[6 * cell + 3 + axis] - database.cellBoxes[6 * cell + axis]);
+    this.yaw = width >= depth ? 0 : Math.PI / 2;
+    this.pitch = 0;
+  }
+
+  ground(point) {
+    const { database } = this;
+    return groundUnder(point, database.groundOf(this.cell), (id) => database.boxOf(id), (id) => database.trianglesOf(id));
+  }
+
+  /** Walk for some seconds: `forward` and `right` from -1 to 1, times `speed` metres a second. */
+  walk(seconds, forward, right, speed) {
+    const length = Math.max(1, Math.hypot(forward, right));
+    const [c, s] = [Math.cos(this.yaw), Math.sin(this.yaw)];
+    const move = [(c * forward + s * right) / length, (s * forward - c * right) / length, 0].map((x) => x * speed * seconds);
+    const pieces = Math.ceil(Math.hypot(...move) / PIECE);
+    for (let piece = 0; piece < pieces; piece++) {
+      const found = this.database.maze.step(this.cell, this.point, move.map((x) => x / pieces));
+      this.point = found.point;
+      this.cell = found.cell;
+    }
+    this.settle(seconds);
+  }
+
+  /** Follow the ground up and down, as far as floors and ceilings of cells let the eye. */
+  settle(seconds) {
+    const ground = this.ground(this.point);
+    if (ground === -Infinity) return;
+    const rest = ground + EYE - this.point[2];
+    const rise = Math.sign(rest) * Math.min(Math.abs(rest), CLIMB * seconds);
+    if (Math.abs(rise) < 1e-4) return;
+    const to = [this.point[0], this.point[1], this.point[2] + rise];
+    const cell = this.database.maze.follow(this.cell, this.point, to);
+    if (cell >= 0) [this.point, this.cell] = [to, cell];
+  }
+
+  /** A unit vector along the view. */
+  get ahead() {
+    const flat = Math.cos(this.pitch);
+    return [flat * Math.cos(this.yaw), flat * Math.sin(this.yaw), Math.sin(this.pitch)];
+  }
+}
+
+/** The view cell from which most may be seen; -1 if there is none. */
+export function busiest(database) {
+  const size = (cell) => database.setOf(cell).potential.length;
+  return [...database.viewCells].reduce((best, cell) => (best < 0 || size(cell) > size(best) ? cell : best), -1);
+}

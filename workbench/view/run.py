@@ -1,0 +1,125 @@
+"""Write a view: index.html, the viewer's script, its licences, and the display database as a script."""
+
+import os
+import shutil
+import tempfile
+import webbrowser
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup, escape
+
+from ...data.errors import InputError
+from ...data.progress import phase
+from ...data.store.scene_folder import held_manifest
+from ...data.store.walk_folder import KIND, read_walk
+from ..pack.run import pack
+from ..pages import fill
+from .contents import contents
+
+if TYPE_CHECKING:
+    from ...data.store.bake_folder import BakeFolder
+    from ...data.store.walk_folder import WalkFolder
+
+PAGE = files(__package__) / "page"
+BUILT = PAGE / "build"
+SCRIPT = "viewer.js"
+# Third-party code is in the script: what its authors ask for goes with it.
+LICENCES = f"{SCRIPT}.LEGAL.txt"
+# A page opened by a double-click may load no more than this in one script, in bytes.
+LARGEST = 200_000_000
+
+
+@dataclass(frozen=True)
+class View:
+    """A view that was written; in a notebook it shows itself.
+
+    Attributes:
+        page: path of its index.html.
+    """
+
+    page: Path
+
+    def __fspath__(self) -> str:
+        return str(self.page)
+
+    def open(self) -> None:
+        """Open it in the browser."""
+        webbrowser.open(self.page.absolute().as_uri())
+
+    def _repr_html_(self) -> str:
+        """The page in a frame; a notebook serves what lies below its own folder."""
+        page = Path(os.path.relpath(self.page)).as_posix()
+        return f'<iframe src="{escape(page)}" width="100%" height="600" style="border:0"></iframe>'
+
+
+def view(
+    source: "BakeFolder | WalkFolder | str | Path", out: str | Path | None = None, *, overwrite: bool = False
+) -> View:
+    """Write a folder that opens by a double-click and needs no network: walk through a bake.
+
+    Args:
+        source: a display database of `viewcell pack`, or a bake, which is packed for it.
+        out: folder to write; `source` with .view in place of its ending by default.
+        overwrite: replace the view that is there.
+
+    Returns:
+        The view.
+
+    Raises:
+        InputError: `source` is neither, something else is in the way, the script was not built, or the model is too
+            large for one file.
+    """
+    folder = Path(source if isinstance(source, str | Path) else source.folder)
+    if not (BUILT / SCRIPT).is_file():
+        raise InputError(f"{SCRIPT}: expected the viewer's script, found none; `make install` builds it")
+    packed = held_manifest(folder, KIND) is not None
+    out = folder.with_suffix(".view") if out is None else Path(out)
+    _check_place(out, overwrite)
+    with phase("view"), tempfile.TemporaryDirectory() as scratch:
+        walk = read_walk(folder) if packed else pack(folder, Path(scratch) / f"{folder.stem}.walk")
+        data = contents(walk)
+        if len(data) > LARGEST:
+            raise InputError(
+                f"{folder}: expected a model whose view takes at most {LARGEST // 10**6} MB, found {len(data) // 10**6}"
+            )
+        title = folder.stem
+        own = Markup((PAGE / "view.css").read_text("utf-8"))
+        texts = {"data.js": data, "index.html": fill(PAGE, "index.html", title=title, own=own)}
+        _write(out, texts)
+    return View(out / "index.html")
+
+
+def _check_place(out: Path, overwrite: bool) -> None:
+    """Refuse to replace what nobody said should be, and what is no view whatever was said."""
+    if not out.exists():
+        return
+    ours = out.is_dir() and (out / "index.html").is_file() and (out / SCRIPT).is_file()
+    if not ours and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(f"{out}: expected a new name or a view, found something else")
+    if ours and not overwrite:
+        raise InputError(f"{out}: expected a new name, found a view; --overwrite (overwrite=True) replaces it")
+
+
+def _write(out: Path, texts: dict[str, str]) -> None:
+    """All files at once, or none: what is half written lies beside the view until it is whole."""
+    fresh = None
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        fresh = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent))
+        for name, text in texts.items():
+            (fresh / name).write_text(text, encoding="utf-8")
+        for name in (SCRIPT, LICENCES):
+            with as_file(BUILT / name) as file:
+                shutil.copyfile(file, fresh / name)
+        # Files of others in a view that is replaced stay.
+        out.mkdir(exist_ok=True)
+        for name in (*texts, SCRIPT, LICENCES):
+            (fresh / name).replace(out / name)
+    except OSError as error:
+        raise InputError(f"{out}: expected to be able to write there, found {error.strerror}") from None
+    finally:
+        if fresh is not None:
+            shutil.rmtree(fresh, ignore_errors=True)
