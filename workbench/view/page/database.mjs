@@ -3,6 +3,19 @@
 import { Maze } from "./maze.mjs";
 import { decode } from "./runs.mjs";
 
+// Corners lie on a grid, up to half a step from where they are placed [m].
+const GRID = 1e-3;
+
+/** Least and most of points, 3 numbers each. */
+function boxAround(points) {
+  const box = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
+  points.forEach((x, k) => {
+    box[k % 3] = Math.min(box[k % 3], x);
+    box[3 + (k % 3)] = Math.max(box[3 + (k % 3)], x);
+  });
+  return box;
+}
+
 export class Database {
   constructor(head, arrays) {
     Object.assign(this, arrays);
@@ -16,6 +29,9 @@ export class Database {
     this.sets = new Map();
     this.shapes = new Map();
     this.boxes = new Map();
+    this.held = new Map();
+    this.around = [];
+    this.itemBoxes = [];
     this.triangleCounts = Array.from({ length: this.objects }, (_, id) => this.itemFaces[this.finestOf(id)]);
   }
 
@@ -67,15 +83,43 @@ export class Database {
     return this.shapes.get(id);
   }
 
+  /** Objects whose boxes meet a cell. */
+  objectsIn(cell) {
+    if (!this.held.has(cell)) {
+      const box = this.cellBoxes.subarray(6 * cell, 6 * cell + 6);
+      const ids = [];
+      for (let id = 0; id < this.objects; id++) {
+        const b = this.aroundOf(id);
+        if ([0, 1, 2].every((axis) => b[axis] <= box[axis + 3] + GRID && b[axis + 3] >= box[axis] - GRID)) ids.push(id);
+      }
+      this.held.set(cell, ids);
+    }
+    return this.held.get(cell);
+  }
+
+  /** A box around an object: around its shape's box where that is placed, so never smaller than the object. */
+  aroundOf(id) {
+    if (!this.around[id]) {
+      const box = this.itemBox(this.finestOf(id));
+      const m = this.transforms.subarray(12 * id, 12 * id + 12);
+      this.around[id] = [0, 1].flatMap((end) => [0, 1, 2].map((row) => {
+        let sum = m[4 * row + 3];
+        for (let k = 0; k < 3; k++) sum += m[4 * row + k] * box[k + (m[4 * row + k] > 0 === (end === 1) ? 3 : 0)];
+        return sum;
+      }));
+    }
+    return this.around[id];
+  }
+
+  itemBox(item) {
+    if (!this.itemBoxes[item]) this.itemBoxes[item] = boxAround(this.item(item).corners);
+    return this.itemBoxes[item];
+  }
+
   /** Least and most of an object's corners. */
   boxOf(id) {
     if (!this.boxes.has(id)) {
-      const box = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
-      this.trianglesOf(id).forEach((x, k) => {
-        box[k % 3] = Math.min(box[k % 3], x);
-        box[3 + (k % 3)] = Math.max(box[3 + (k % 3)], x);
-      });
-      this.boxes.set(id, box);
+      this.boxes.set(id, boxAround(this.trianglesOf(id)));
     }
     return this.boxes.get(id);
   }

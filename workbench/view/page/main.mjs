@@ -1,6 +1,7 @@
 // The viewer: walk through a display database, from inside and from above.
 
 import { Database } from "./database.mjs";
+import { eyeSees } from "./eye.mjs";
 import { Keys } from "./keys.mjs";
 import { Panel } from "./panel.mjs";
 import { Stage } from "./stage.mjs";
@@ -8,6 +9,7 @@ import { arraysOf, unpacked } from "./unpack.mjs";
 import { Visitor } from "./visitor.mjs";
 
 const VIEWS = ["inside", "both", "above"];
+const MODES = ["set", "eye", "whole"];
 // Seconds that a frame may count for: what a hidden tab misses is not walked.
 const LONGEST = 0.1;
 
@@ -57,7 +59,7 @@ class Viewer {
 
   pressed(code) {
     if (code === "KeyV") this.choose("view", VIEWS[(VIEWS.indexOf(this.chosen.view) + 1) % 3]);
-    if (code === "KeyM") this.choose("mode", this.chosen.mode === "set" ? "whole" : "set");
+    if (code === "KeyM") this.choose("mode", MODES[(MODES.indexOf(this.chosen.mode) + 1) % 3]);
     if (code === "KeyO") this.choose("outlines", !this.chosen.outlines);
     if (code === "KeyC") this.choose("verdicts", !this.chosen.verdicts);
   }
@@ -75,13 +77,36 @@ class Viewer {
     this.stale = true;
   }
 
+  /** What the eye sees of its cell's set, as an array of 0 and 1; or all of the set where that cannot be told. */
+  sight(shown) {
+    const { database, visitor, stage } = this;
+    const cells = database.cellsOf(visitor.cell);
+    const found = database.maze.axes.length
+      ? eyeSees(database.maze, visitor.point, stage.planes(), (id) => database.aroundOf(id),
+        (cell) => database.objectsIn(cell), shown, cells && new Set(cells))
+      : null;
+    if (!found) return shown;
+    const out = new Uint8Array(database.objects);
+    for (const id of found.objects) out[id] = 1;
+    return out;
+  }
+
+  /** Show what the eye sees and nothing else. */
+  look() {
+    this.stage.aim(this.visitor, this.chosen.view);
+    const shown = this.sight(this.kept);
+    this.stage.inside.show(shown);
+    this.tell(Array.from(shown.keys()).filter((id) => shown[id]));
+  }
+
   /** Bring what is shown up to where the visitor is. */
   enter() {
     const { database, visitor, stage, chosen } = this;
     const set = database.setOf(visitor.cell);
     const potential = set ? set.potential : Array.from({ length: database.objects }, (_, id) => id);
-    const shown = new Uint8Array(database.objects).fill(chosen.mode === "set" ? 0 : 1);
+    const shown = new Uint8Array(database.objects).fill(chosen.mode === "whole" ? 1 : 0);
     for (const id of potential) shown[id] = 1;
+    this.kept = shown;
     const verdicts = new Array(database.objects).fill("hidden");
     for (const id of potential) verdicts[id] = !set || set.unknown.has(id) ? "unknown" : "seen";
     stage.show(shown, chosen.verdicts ? verdicts : null);
@@ -90,17 +115,26 @@ class Viewer {
     const { sides, axes } = database.maze;
     const portals = Array.from(axes, (_, k) => k).filter((k) => near.has(sides[2 * k]) && near.has(sides[2 * k + 1]));
     stage.outline(visitor.cell, cells, portals);
+    this.tell(chosen.mode === "whole" ? null : potential);
+    this.cell = visitor.cell;
+  }
+
+  /** Say where the visitor is, and how much is drawn: these objects, or all. */
+  tell(drawn) {
+    const { database, visitor } = this;
+    const set = database.setOf(visitor.cell);
+    const count = (number) => number.toLocaleString("en");
     const sum = (ids) => ids.reduce((all, id) => all + database.triangleCounts[id], 0);
-    const whole = database.triangleCounts.reduce((all, one) => all + one, 0);
-    const here = chosen.mode === "set" ? potential.length : database.objects;
-    const name = visitor.cell < 0 ? "outside all cells" : `cell ${database.cellIds[visitor.cell]} ${database.head.cellNames[visitor.cell]}`;
-    this.counts = { drawn: here, potential: potential.length, objects: database.objects };
+    const whole = this.whole ??= database.triangleCounts.reduce((all, one) => all + one, 0);
+    const [here, potential] = [drawn?.length ?? database.objects, set?.potential.length ?? database.objects];
+    const cell = visitor.cell;
+    const name = cell < 0 ? "outside all cells" : `cell ${database.cellIds[cell]} ${database.head.cellNames[cell]}`;
+    this.counts = { drawn: here, potential, objects: database.objects };
     this.panel.say({
       cell: set ? name : `${name}: no view cell, so everything is kept`,
-      drawn: `${here.toLocaleString("en")} drawn, ${potential.length.toLocaleString("en")} potential (${set ? set.unknown.size : "all"} unknown), of ${database.objects.toLocaleString("en")}`,
-      triangles: `${(chosen.mode === "set" ? sum(potential) : whole).toLocaleString("en")} of ${whole.toLocaleString("en")}`,
+      drawn: `${count(here)} drawn, ${count(potential)} potential (${set ? set.unknown.size : "all"} unknown), of ${count(database.objects)}`,
+      triangles: `${count(drawn ? sum(drawn) : whole)} of ${count(whole)}`,
     });
-    this.cell = visitor.cell;
   }
 
   frame(now) {
@@ -116,6 +150,7 @@ class Viewer {
     const turned = `${this.visitor.yaw} ${this.visitor.pitch} ${JSON.stringify(this.stage.orbit)}`;
     if (this.stale || asked || before !== this.visitor.point.join() || turned !== this.turned) {
       const start = performance.now();
+      if (this.chosen.mode === "eye") this.look();
       this.stage.draw(this.visitor, this.chosen.view, this.chosen.height);
       this.times = [...this.times.slice(-29), performance.now() - start];
       this.panel.say({ rate: `${(this.times.reduce((a, b) => a + b) / this.times.length).toFixed(1)} ms a frame on the processor` });

@@ -75,6 +75,30 @@ export class Stage {
     this.lines.portals.set(boxLines(portalBoxes(maze, portals)));
   }
 
+  /** Turn the eye to where a visitor looks, in the part of the page that a view leaves it. */
+  aim(visitor, view) {
+    const { eye, canvas } = this;
+    eye.position.set(...visitor.point);
+    eye.lookAt(...visitor.point.map((x, k) => x + visitor.ahead[k]));
+    const width = view === "both" ? Math.floor(canvas.clientWidth / 2) : canvas.clientWidth;
+    eye.aspect = Math.max(1, width) / Math.max(1, canvas.clientHeight);
+    eye.updateProjectionMatrix();
+    eye.updateMatrixWorld();
+  }
+
+  /** Planes through the eye and the borders of its picture: unit normals that point inwards. */
+  planes() {
+    const ways = this.corners();
+    return ways.map((way, k) => new Vector3().crossVectors(ways[(k + 1) % 4], way).normalize().toArray());
+  }
+
+  /** Ways from the eye to the corners of its picture, anticlockwise. */
+  corners() {
+    const { eye } = this;
+    const at = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
+    return at.map(([x, y]) => new Vector3(x, y, 0.5).unproject(eye).sub(eye.position).normalize());
+  }
+
   /** Draw what a visitor sees, and, below a height, where they are: `inside`, `above`, or `both`. */
   draw(visitor, view, height) {
     const { renderer, canvas, eye, sky, head } = this;
@@ -85,8 +109,7 @@ export class Stage {
       renderer.setSize(width, depth, false);
     }
     this.cut.constant = height;
-    eye.position.set(...visitor.point);
-    eye.lookAt(...visitor.point.map((x, k) => x + visitor.ahead[k]));
+    this.aim(visitor, view);
     head.position.copy(eye.position);
     const { turn, rise, away } = this.orbit;
     const middle = view === "both" ? visitor.point : [0, 1, 2].map((k) => (this.bounds[k] + this.bounds[k + 3]) / 2);
@@ -116,9 +139,7 @@ export class Stage {
   /** Edges of what the eye's picture shows, as far as REACH, 6 numbers each. */
   frustum() {
     const { eye } = this;
-    eye.updateMatrixWorld();
-    const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([x, y]) =>
-      new Vector3(x, y, 0.5).unproject(eye).sub(eye.position).setLength(REACH).add(eye.position).toArray());
+    const corners = this.corners().map((way) => way.multiplyScalar(REACH).add(eye.position).toArray());
     const middle = eye.position.toArray();
     return new Float32Array(corners.flatMap((corner, k) => [...middle, ...corner, ...corner, ...corners[(k + 1) % 4]]));
   }
