@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: install run test test-slow mutants lint docs clean
+.PHONY: install run walk test test-slow mutants lint docs clean
 
 install: .venv/installed
 
@@ -21,6 +21,13 @@ run: install
 	$(BIN)/viewcell bake out/office.scene --out out/office --overwrite
 	$(BIN)/viewcell verify out/office
 	$(BIN)/viewcell report out/office
+
+# An office of the size of Soda Hall, from the model to the papers' tables: out/soda.tour.
+walk: install
+	$(BIN)/viewcell make office --like soda-hall --out out/soda.scene --overwrite
+	$(BIN)/viewcell bake out/soda.scene --lods --out out/soda.bake --overwrite
+	$(BIN)/viewcell pack out/soda.bake --flatten --out out/soda.walk --overwrite
+	$(BIN)/viewcell walk out/soda.walk --policy all --check 20 --polygon-bytes 158
 
 # Stealing work leaves tests of a file in one process, so what they share is made once.
 test: install

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .workbench.inspect.run import inspect
     from .workbench.pack.run import pack
     from .workbench.report.run import report
+    from .workbench.walk.run import walk
 
 _HOME = {
     "Bake": "viewcell.workbench.baked",
@@ -38,6 +39,7 @@ _HOME = {
     "pack": "viewcell.workbench.pack.run",
     "read": "viewcell.data.readers",
     "report": "viewcell.workbench.report.run",
+    "walk": "viewcell.workbench.walk.run",
 }
 
 __all__ = [
@@ -55,6 +57,7 @@ __all__ = [
     "pack",
     "read",
     "report",
+    "walk",
 ]
 
 

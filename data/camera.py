@@ -18,6 +18,8 @@ ROUNDING_PIXELS = 1.0e-3
 PIXELS_MOST = 2**26
 # Rays across a rectangle, each way, to tell how much of it a box covers.
 RAYS = 8
+# Boxes whose rays are cast together.
+BOXES = 256
 CORNERS = np.array(list(product((0, 1), repeat=3)))
 EDGES = np.array([(a, b) for a in range(8) for b in range(a) if np.abs(CORNERS[a] - CORNERS[b]).sum() == 1])
 
@@ -145,12 +147,17 @@ def covered_pixels(
     hits = np.zeros(len(boxes))
     low, high = boxes[:, 0] - eyes, boxes[:, 1] - eyes
     steps = (np.arange(RAYS) + 0.5) / RAYS
-    for u, v in product(steps, steps):
-        pixel = rectangles[:, 0] + (rectangles[:, 1] - rectangles[:, 0]) * [u, v]
-        rays = np.einsum("ni,nij->nj", np.column_stack([pixel, np.full(len(pixel), screen.focal)]), axes)
+    grid = np.array(list(product(steps, steps)))
+    # All rays of a few boxes at a time: numbers that a cache holds, and calls that do not outweigh them.
+    for first in range(0, len(boxes), BOXES):
+        some = slice(first, first + BOXES)
+        corner = rectangles[some, 0, None]
+        pixels = corner + (rectangles[some, 1, None] - corner) * grid
+        rays = pixels @ axes[some, :2] + screen.focal * axes[some, 2:]
         # A ray along a face's plane must not divide by 0.
         rays = np.where(np.abs(rays) < 1e-12, 1e-12, rays)
-        enter = np.minimum(low / rays, high / rays).max(axis=1)
-        leave = np.maximum(low / rays, high / rays).min(axis=1)
-        hits += (leave >= enter) & (leave > 0)
+        near, far = low[some, None] / rays, high[some, None] / rays
+        enter = np.minimum(near, far).max(axis=2)
+        leave = np.maximum(near, far).min(axis=2)
+        hits[some] = ((leave >= enter) & (leave > 0)).sum(axis=1)
     return np.maximum(area * hits / RAYS**2, 1.0)
