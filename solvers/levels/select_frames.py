@@ -18,6 +18,8 @@ from .benefit import Candidates, Sightings, hysteresis_factor
 
 # Hysteresis that slack is spent on, strongest first.
 STRONG = (0.95, 0.6)
+# More than the sum of a frame's benefits is rounded by.
+ROUNDING = 2.0**-40
 # benefits (1, levels), costs, starts, budget, level of each object in the last frame or -1 -> level of each object.
 Chooser = Callable[[np.ndarray, np.ndarray, np.ndarray, int, np.ndarray], np.ndarray]
 
@@ -246,7 +248,28 @@ def certified_bound(problem: Frame, candidates: Candidates, cost: np.ndarray, bu
     if not len(problem.sightings):
         return 0.0
     ids = problem.candidates
-    return float(launch_select(candidates.benefit[ids][None], cost[ids], problem.starts, budget).bound[0])
+    benefit = candidates.benefit[ids]
+    best = best_of_all(benefit, cost[ids], problem.starts, budget)
+    if best is not None:
+        return float(benefit[problem.starts[:-1] + best].sum() * (1 + ROUNDING))
+    return float(launch_select(benefit[None], cost[ids], problem.starts, budget).bound[0])
+
+
+def best_of_all(benefit: np.ndarray, cost: np.ndarray, starts: np.ndarray, budget: int) -> np.ndarray | None:
+    """The most beneficial level of each object, of equals the cheapest, then the first; None if they do not all fit.
+
+    Args:
+        benefit: of each level, shape (levels,), float64.
+        cost: of each level, int64.
+        starts: levels of object g are starts[g] : starts[g + 1], at least one.
+        budget: that all may cost.
+
+    Returns:
+        Place of each among its object's levels, shape (objects,), int64: the optimum, for no choice is worth more.
+    """
+    owners = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    best = np.lexsort((cost, -benefit, owners))[starts[:-1]]
+    return best - starts[:-1] if cost[best].sum() <= budget else None
 
 
 def _solve(

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...data.graph import CellGraph
 from .range_cells import box_distances
-from .set_items import Motion, SetItems, Shelves, turn_seconds
+from .set_items import Balls, Motion, SetItems, Shelves, turn_seconds
 
 # Share of the cache that is looked ahead to; the rest holds what was needed before.
 SHARE = 0.9
@@ -59,7 +59,7 @@ class Stock:
     Attributes:
         shelves: levels as items.
         sets: items of view cells.
-        boxes: of objects [m], shape (objects, 2, 3), float64.
+        balls: around objects [m].
         graph: cells [grid steps].
         cells: cell of each row of the sets, int64.
         grid_m: [m].
@@ -70,7 +70,7 @@ class Stock:
 
     shelves: Shelves
     sets: SetItems
-    boxes: np.ndarray
+    balls: Balls
     graph: CellGraph
     cells: np.ndarray
     grid_m: float
@@ -82,18 +82,20 @@ class Stock:
         """Entries of rows, and the time before which none of them can be in view [s]."""
         entries, place = self.sets.of_rows(rows)
         owners = self.sets.objects[entries]
-        listed = np.zeros(len(self.boxes), bool)
+        listed = np.zeros(len(self.balls.radii), bool)
         listed[owners] = True
-        ids, turning = np.flatnonzero(listed), np.zeros(len(self.boxes))
-        turning[ids] = turn_seconds(self.boxes[ids], now.eye, now.forward, self.half_angle, self.motion)
+        ids, turning = np.flatnonzero(listed), np.zeros(len(self.balls.radii))
+        turning[ids] = turn_seconds(self.balls.take(ids), now.eye, now.forward, self.half_angle, self.motion)
         return entries, np.maximum(seconds[place], turning[owners])
 
     def shown_items(self, now: Now) -> np.ndarray:
-        """What the frame shows: all coarsest levels, the largest first, then wanted ones, most pixels a byte first."""
-        coarse, sizes = self.shelves.coarsest[now.shown], self.shelves.sizes
-        rank = np.argsort(-now.worth, kind="stable")
-        gain = np.argsort(-now.worth / np.maximum(sizes[now.wanted], 1), kind="stable")
-        return first_of_each(np.concatenate([coarse[rank], now.wanted[gain]]))
+        """What the frame shows: coarsest and wanted levels of all objects, those with the most pixels a byte first.
+
+        An object's coarsest level is the smaller one and comes no later.
+        """
+        items = np.concatenate([self.shelves.coarsest[now.shown], now.wanted])
+        worth = np.concatenate([now.worth, now.worth])
+        return first_of_each(items[np.argsort(-worth / np.maximum(self.shelves.sizes[items], 1), kind="stable")])
 
     def cut(self, items: np.ndarray, most: float) -> np.ndarray:
         """The first of the items that fit into so many bytes together."""
@@ -157,7 +159,10 @@ class AsPublished(Policy):
 
 
 class CoarseFirst(Policy):
-    """What is shown now; then all that range cells may see, the coarsest levels first, as far as the cache reaches."""
+    """What is shown now, most pixels a byte first; then all that range cells may see, the coarsest levels first.
+
+    As far as 90 % of the cache reach.
+    """
 
     name = "coarse-first"
 

@@ -38,8 +38,12 @@ class RangeCells:
         # Two portals may belong to the same two cells: the pair counts once.
         pairs = np.unique((row * max(1, count) + column)[row != column])
         row, column = np.divmod(pairs, max(1, count))
-        self._length = box_distances(self._portals[row], self._portals[column])
-        self._ends, self._begins = column.astype(np.int32), np.searchsorted(row, np.arange(count + 1)).astype(np.int32)
+        # Room for the eye's row: it may see as many portals as cells have that meet.
+        room, size = np.zeros(count, np.int32), (count + 1, count + 1)
+        length = np.concatenate([box_distances(self._portals[row], self._portals[column]), room])
+        begins = np.append(np.searchsorted(row, np.arange(count + 1)), len(length)).astype(np.int32)
+        self._ways = csr_array((length, np.concatenate([column.astype(np.int32), room]), begins), shape=size)
+        self._begins = begins
 
     def near(self, eye: np.ndarray, holders: np.ndarray, reach_m: float) -> tuple[np.ndarray, np.ndarray]:
         """Cells that can be reached on a way of at most so long, and at least how long it is.
@@ -53,9 +57,12 @@ class RangeCells:
             Cells, int64, and lengths [m], float64, never more than any way through portals; ascending by length, then
             by cell.
         """
-        length = box_distances(self._cells, np.stack([eye, eye]))
+        here = np.stack([eye, eye])
         if (holders < self._tiles).any():
-            length[: self._tiles] = self._through_portals(eye, holders[holders < self._tiles], reach_m)
+            ways = self._through_portals(eye, holders[holders < self._tiles], reach_m)
+            length = np.concatenate([ways, box_distances(self._cells[self._tiles :], here)])
+        else:
+            length = box_distances(self._cells, here)
         length[holders] = 0.0
         cells = np.flatnonzero(length <= reach_m)
         order = np.argsort(length[cells], kind="stable")
@@ -69,13 +76,12 @@ class RangeCells:
         near = first <= reach_m
         if not near.any():
             return out
-        # The eye is one more node, behind all portals.
-        count = len(self._portals)
-        lengths = np.concatenate([self._length, first[near]])
-        ends = np.concatenate([self._ends, own[near].astype(np.int32)])
-        begins = np.append(self._begins, np.int32(len(ends)))
-        ways = csr_array((lengths, ends, begins), shape=(count + 1, count + 1))
-        found = dijkstra(ways, indices=count, limit=reach_m)[:count]
+        # The eye is one more node, behind all portals; only its row changes.
+        count, last = len(self._portals), self._begins[-2]
+        own, first = own[near], first[near]
+        self._ways.data[last : last + len(own)], self._ways.indices[last : last + len(own)] = first, own
+        self._ways.indptr[-1] = last + len(own)
+        found = dijkstra(self._ways, indices=count, limit=reach_m)[:count]
         reached = np.flatnonzero(found <= reach_m)
         for side in range(2):
             np.minimum.at(out, self._pairs[reached, side], found[reached])

@@ -4,6 +4,7 @@ Source: Funkhouser et al. 1996, section 4.3.1 (lookahead objects, up to the leve
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -41,12 +42,12 @@ class Shelves:
         np.minimum.at(steps, items, counts[owner] - 1 - level)
         return cls(starts, items, table, sizes, faces, steps)
 
-    @property
+    @cached_property
     def counts(self) -> np.ndarray:
         """Levels of each object."""
         return np.diff(self.starts)
 
-    @property
+    @cached_property
     def coarsest(self) -> np.ndarray:
         """Item of the coarsest level of each object."""
         return self.items[self.starts[1:] - 1]
@@ -106,9 +107,31 @@ class Motion:
     ahead_s: float = 1.0
 
 
-def turn_seconds(
-    boxes: np.ndarray, eye: np.ndarray, forward: np.ndarray, half_angle: float, motion: Motion
-) -> np.ndarray:
+@dataclass(frozen=True)
+class Balls:
+    """Balls around boxes.
+
+    Attributes:
+        boxes: [m], shape (n, 2, 3), float64.
+        middles: [m], shape (n, 3).
+        radii: [m], shape (n,).
+    """
+
+    boxes: np.ndarray
+    middles: np.ndarray
+    radii: np.ndarray
+
+    @classmethod
+    def around(cls, boxes: np.ndarray) -> "Balls":
+        """The smallest."""
+        return cls(boxes, boxes.mean(axis=1), np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) / 2)
+
+    def take(self, ids: np.ndarray) -> "Balls":
+        """Some of them."""
+        return Balls(self.boxes[ids], self.middles[ids], self.radii[ids])
+
+
+def turn_seconds(balls: Balls, eye: np.ndarray, forward: np.ndarray, half_angle: float, motion: Motion) -> np.ndarray:
     """The time before boxes can come into view, of an eye that moves and turns as it may; a lower bound.
 
     A way of v t < d changes the direction in which a point at distance d is seen by at most asin(v t / d), which is at
@@ -116,7 +139,7 @@ def turn_seconds(
     gets there, d / v.
 
     Args:
-        boxes: [m], shape (n, 2, 3), float64.
+        balls: around n boxes.
         eye: [m], shape (3,).
         forward: direction of view, unit length, shape (3,).
         half_angle: from there to the corner of the screen [radians].
@@ -125,14 +148,13 @@ def turn_seconds(
     Returns:
         [s], shape (n,), float64; 0 for what may be in view.
     """
-    middle = boxes.mean(axis=1) - eye
-    away = np.linalg.norm(middle, axis=1)
-    radius = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) / 2
-    within = away <= radius
-    far = np.where(within, 1.0, away)
-    angle = np.arccos(np.clip(middle @ forward / far, -1, 1)) - np.arcsin(np.minimum(radius / far, 1.0)) - half_angle
-    angle = np.where(within, 0.0, np.maximum(angle, 0.0))
-    apart = np.maximum(np.maximum(boxes[:, 0] - eye, eye - boxes[:, 1]), 0)
-    distance = np.maximum(np.linalg.norm(apart, axis=1), 1e-9)
+    middle = balls.middles - eye
+    away = np.sqrt(np.einsum("ni,ni->n", middle, middle))
+    far = np.maximum(away, 1e-9)
+    angle = np.arccos(np.clip(middle @ forward / far, -1, 1))
+    angle -= np.arcsin(np.minimum(balls.radii / far, 1.0))
+    angle = np.where(away <= balls.radii, 0.0, np.maximum(angle - half_angle, 0.0))
+    apart = np.maximum(np.maximum(balls.boxes[:, 0] - eye, eye - balls.boxes[:, 1]), 0)
+    distance = np.maximum(np.sqrt(np.einsum("ni,ni->n", apart, apart)), 1e-9)
     turning = angle / (np.radians(motion.turn_deg) + np.pi * motion.speed / (2 * distance))
     return np.minimum(turning, distance / motion.speed)

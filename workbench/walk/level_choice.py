@@ -4,11 +4,13 @@ import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from ...data.camera import Screen
 from ...data.errors import InputError
 from ...solvers.levels.benefit import Algorithm, BenefitSettings
 from ...solvers.levels.cost_model import CostModel
-from ...solvers.levels.select_frames import Chooser, Coherence
+from ...solvers.levels.select_frames import Chooser, Coherence, best_of_all
 from ..tune.lod import CHOOSERS, COHERENCE, HIGHS, KERNEL
 
 # Measured by `viewcell tune lod` on the office like Soda Hall, 640 x 480 pixels; kept, so that a walk is the same
@@ -47,8 +49,14 @@ class LevelChoice:
 
     @property
     def choose(self) -> Chooser:
-        """Solves one frame."""
-        return CHOOSERS[self.method]
+        """Solves one frame; where the time suffices for the best of everything there is nothing to solve."""
+        solve = CHOOSERS[self.method]
+
+        def choose(b: np.ndarray, c: np.ndarray, s: np.ndarray, budget: int, before: np.ndarray) -> np.ndarray:
+            best = best_of_all(b[0], c, s, budget)
+            return solve(b, c, s, budget, before) if best is None else best
+
+        return choose
 
     def benefit_of(self, kinds: set[str]) -> BenefitSettings:
         """The benefit for a model of these kinds."""

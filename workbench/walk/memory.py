@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...data.store.ranges import items_in, ranges_of
+from ...data.store.ranges import Range, items_in, ranges_of
 from ...solvers.levels.benefit import NOTHING
 from ...solvers.walk.cache import RESIDENT, Cache
 from ...solvers.walk.policies import Now, Policy
@@ -69,6 +69,19 @@ class Stored:
     seconds: float
 
 
+def gap_bytes(line: Line) -> int:
+    """Bytes that come in the time that another read costs."""
+    return max(GAP_BYTES, int(line.latency_s * line.bytes_per_s))
+
+
+def urgent_first(items: np.ndarray, shown: np.ndarray, layout: Layout, gap: int) -> list[Range]:
+    """Ranges of items; those that are shown now come first, and are not held up by what lies beside them."""
+    urgent = np.isin(items, shown)
+    return [
+        one for part in (items[urgent], items[~urgent]) for one in ranges_of(part, layout.offsets, layout.sizes, gap)
+    ]
+
+
 class Memory:
     """Items that are there, by a policy."""
 
@@ -81,10 +94,11 @@ class Memory:
         if policy.near_share is not None:
             self._group, shares = (shelves.steps == 0).astype(np.int64), [policy.near_share, 1 - policy.near_share]
         self.caches = [Cache(shelves.sizes, int(share * capacity), policy.bounded) for share in shares]
-        self._gap = max(GAP_BYTES, int(line.latency_s * line.bytes_per_s))
+        self._gap = gap_bytes(line)
         # Bytes of resident items, where a source gives them.
         self.held: dict[int, bytes] = {}
         self.failures: dict[str, int] = {}
+        self._going: list[int] = []
         self._in_flight, self._in_a_row = 0, 0
 
     @property
@@ -102,6 +116,10 @@ class Memory:
             clock_s: time of the walk [s].
         """
         begin = time.perf_counter()
+        # What the frame before has drawn was there until it was.
+        for item in self._going:
+            self.held.pop(item, None)
+        self._going = []
         failed, swap_s = self._take(clock_s)
         drawn = self.drawn(now.shown, lods)
         for wanted in self._reader.withdraw():
@@ -113,10 +131,9 @@ class Memory:
             change = cache.change(number, ahead[self._group[ahead] == group], left)
             left -= int(self._layout.sizes[change.read].sum())
             read.append(change.read)
-            for item in change.released.tolist():
-                self.held.pop(item, None)
+            self._going += change.released.tolist()
         asked = np.concatenate(read)
-        ranges = ranges_of(asked, self._layout.offsets, self._layout.sizes, self._gap)
+        ranges = urgent_first(asked, self.policy.stock.shown_items(now), self._layout, self._gap)
         self._in_flight += sum(wanted.size for wanted in ranges)
         self._reader.ask(ranges, clock_s)
         short = (drawn >= 0) & (drawn != lods)

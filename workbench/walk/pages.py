@@ -14,7 +14,7 @@ from ...data.store.remote import is_remote
 from ...data.version import __version__
 from ..files import write_files
 from ..pages import TEMPLATES, fill
-from .tables import Table, notes, tables, truth_table
+from .tables import Table, arrival_table, notes, tables, truth_table
 from .tally import Walked
 
 
@@ -57,7 +57,7 @@ def write_walk(walked: Walked, out: Path) -> list[str]:
 
 def _all(walked: Walked) -> list[Table]:
     """Tables, what checks found last."""
-    return [*tables(walked), *([truth_table(walked)] if walked.truths else [])]
+    return [*tables(walked), *([truth_table(walked), arrival_table(walked)] if walked.truths else [])]
 
 
 def _picture(walked: Walked) -> bytes | None:

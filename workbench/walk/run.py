@@ -21,10 +21,11 @@ from ...data.store.walk_folder import WalkFolder
 from ...solvers.levels.benefit import NOTHING
 from ...solvers.walk.policies import POLICIES, Now, Policy, Stock
 from ...solvers.walk.range_cells import RangeCells
-from ...solvers.walk.set_items import SetItems
+from ...solvers.walk.set_items import Balls, SetItems
+from .arrival import Arrivals, oracle_bytes, policy_bytes
 from .display import Display, Shown, check_path, shelves_of
 from .level_choice import LevelChoice, read_level_choice
-from .memory import Layout, Memory
+from .memory import Layout, Memory, gap_bytes
 from .opened import Opened, opened
 from .path import read_path
 from .path import walk as generated
@@ -100,7 +101,7 @@ class _Tour:
         check_path(walk, path, self._holders)
         self._check_walls()
         known = self._display.known
-        screen, boxes = settings.screen, self._display.boxes
+        screen = settings.screen
         half_angle = float(np.arctan(np.hypot(screen.width, screen.height) / 2 / screen.focal))
         self._row_of = np.full(walk.graph.cell_count, -1)
         self._row_of[known.cells] = np.arange(len(known.cells))
@@ -108,7 +109,7 @@ class _Tour:
         self.stock = Stock(
             shelves,
             sets,
-            boxes,
+            Balls.around(self._display.boxes),
             walk.graph,
             known.cells,
             walk.grid_m,
@@ -177,16 +178,33 @@ class _Tour:
                 for frame in range(count):
                     frames.append(self._display.frame(self._path, frame))
                     bar.update()
-            found, truths = [], []
+            found, truths, arrivals = [], [], []
             for kind in self._kinds():
                 shown, stored, truth = self._by(kind(self.stock), frames, sampled, judge, bar.update)
                 found.append(stored)
                 truths.append(truth)
+                if judge is not None:
+                    arrivals.append(self._arrivals(kind, shown, sampled, judge))
         return Walked(
             self._opened.place, self._path, settings, self._model(), self._opened.index_bytes,
             shown_frames(shown, self._display.tuples, self.stock.shelves), found,
-            [truth for truth in truths if truth is not None],
+            [truth for truth in truths if truth is not None], arrivals,
         )  # fmt: skip
+
+    def _arrivals(
+        self, kind: Callable[[Stock], Policy], frames: list[Shown], sampled: np.ndarray, judge: Judge
+    ) -> Arrivals:
+        """Bytes from nothing to what the eyes of sampled frames see."""
+        gap, sizes, found = gap_bytes(self._line), self.stock.shelves.sizes, []
+        for frame in sampled.tolist():
+            policy, now = kind(self.stock), self._now(frame, frames[frame])
+            pixels = judge.visible_pixels(frame, frames[frame])
+            read = policy_bytes(policy, now, pixels, self._layout, gap, self._settings.read_bytes)
+            # What objects share, an oracle reads once.
+            items, place = np.unique(now.wanted, return_inverse=True)
+            shown = np.bincount(place, pixels, len(items)).astype(np.int64)
+            found.append((*read, oracle_bytes(shown, sizes[items])))
+        return Arrivals(policy.name, *(np.array(part).reshape(-1, 2) for part in zip(*found, strict=True)))
 
     def _model(self) -> Model:
         """What there is in all."""

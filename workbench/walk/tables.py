@@ -199,10 +199,31 @@ def truth_table(walked: Walked) -> Table:
     return Table("Truth: sampled frames against rays and pictures of the whole model", head, rows)
 
 
+def arrival_table(walked: Walked) -> Table:
+    """From nothing to what the eye sees."""
+    rows = []
+    for one in walked.arrivals:
+        # Ratios of never are never.
+        ratios, never = one.ratios, np.isinf(one.asked).any(axis=1)
+        cells = [one.policy]
+        for column in range(2):
+            kb, ratio = np.median(one.asked[:, column]) / 1e3, ratios[:, column]
+            read = np.median(one.read[:, column]) / 1e3
+            # With "higher" no mean is made of what never comes.
+            most = np.quantile(ratio, 0.9, method="higher")
+            cells += [f"{kb:,.1f}", f"{np.median(ratio):.2f}", f"{most:.2f}", f"{read:,.1f}"]
+        rows.append((*cells, f"{never.sum():,}"))
+    head = (
+        *("policy", "kB to 99 %, median", "x oracle, median", "90 %", "with gaps, kB"),
+        *("kB to 100 %, median", "x oracle, median", "90 %", "with gaps, kB", "eyes that never"),
+    )
+    return Table("From nothing to what the eye sees: bytes of items", head, rows)
+
+
 def walk_text(walked: Walked) -> str:
     """Everything, for a terminal."""
     shown = tables(walked) if len(walked.policies) == 1 else [*tables(walked)[:2], *_of_each(walked)]
-    shown += [truth_table(walked)] if walked.truths else []
+    shown += [truth_table(walked), arrival_table(walked)] if walked.truths else []
     wrong = [
         f"frame {one.frame}, {truth.policy}: objects {sorted({*one.dropped, *one.undrawn})} are seen and not drawn, "
         f"{one.wrong} pixels wrong; this is a bug"

@@ -8,6 +8,7 @@ from ...data.camera import CameraPath
 from ...solvers.levels.benefit import Tuples
 from ...solvers.walk.policies import Policy
 from ...solvers.walk.set_items import Shelves
+from .arrival import Arrivals
 from .display import Shown
 from .memory import Memory, Stored
 from .settings import WalkSettings
@@ -156,6 +157,7 @@ class Walked:
             chosen_polygons, finest_ms and chosen_ms (modelled times to draw them), switches, dropped, eye_s, levels_s.
         policies: frames by each policy.
         truths: what checks of sampled frames found, by each policy; empty without.
+        arrivals: bytes from nothing to what the eyes of these frames see, likewise.
     """
 
     place: str
@@ -166,6 +168,7 @@ class Walked:
     shown: dict[str, np.ndarray]
     policies: list[PolicyFrames]
     truths: list[Truth] = field(default_factory=list)
+    arrivals: list[Arrivals] = field(default_factory=list)
 
     @property
     def ok(self) -> bool:

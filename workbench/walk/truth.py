@@ -125,6 +125,12 @@ class Judge:
             int((picture != whole).sum()), len(doubtful),
         )  # fmt: skip
 
+    def visible_pixels(self, frame: int, shown: Shown) -> np.ndarray:
+        """Pixels that show each object that the eye may see, all at the levels that were chosen, int64."""
+        picture = self._drawn_picture(frame, shown.objects, shown.lods, {}).ravel()
+        counts = np.bincount(picture[picture >= 0], minlength=len(self._still))
+        return counts[shown.objects]
+
     def _picture(self, frame: int, objects: np.ndarray) -> np.ndarray:
         """The object that each pixel shows, of some at their finest."""
         calls = np.column_stack([self._starts[objects], self._starts[objects + 1], objects])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from viewcell.solvers.walk.set_items import Motion, SetItems, Shelves, turn_seconds
+from viewcell.solvers.walk.set_items import Balls, Motion, SetItems, Shelves, turn_seconds
 
 # Object 0 has one level, 1 has three, 2 shares the coarsest of 1.
 STARTS, ITEMS = np.array([0, 1, 4, 6]), np.array([0, 4, 3, 1, 5, 1])
@@ -35,7 +35,7 @@ def test_vectors():
     motion = Motion(speed=2.0, turn_deg=90.0, ahead_s=1.0)
     eye, forward = np.zeros(3), np.array([1.0, 0, 0])
     boxes = np.array([[[5, -1, -1], [6, 1, 1]], [[-1, -1, -1], [1, 1, 1]], [[-6, -0.1, -0.1], [-5.9, 0.1, 0.1]]])
-    found = turn_seconds(boxes, eye, forward, np.radians(30), motion)
+    found = turn_seconds(Balls.around(boxes), eye, forward, np.radians(30), motion)
     assert found[0] == 0 and found[1] == 0
     # Right behind: 180 - 30 degrees less its own size to turn, 5.9 m away.
     assert 1.1 < found[2] < 150 / 90
@@ -49,7 +49,7 @@ def test_nothing_is_in_view_sooner(seed):
     boxes = np.stack([low, low + rng.uniform(0, 1.5, (200, 3))], axis=1)
     motion, half = Motion(2.0, 120.0, 1.0), np.radians(35)
     eye, forward = np.zeros(3), np.array([1.0, 0, 0])
-    least = turn_seconds(boxes, eye, forward, half, motion)
+    least = turn_seconds(Balls.around(boxes), eye, forward, half, motion)
     assert (least > 0.3).any()
     for _ in range(400):
         t = rng.uniform(0, 1.5)
