@@ -78,15 +78,27 @@ class Stock:
     motion: Motion
     capacity: int
 
-    def entry_times(self, now: Now, rows: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Entries of rows, and the time before which none of them can be in view [s]."""
-        entries, place = self.sets.of_rows(rows)
-        owners = self.sets.objects[entries]
+    def item_times(self, now: Now, rows: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Items of rows, ascending, and the time before which each cannot be in view [s].
+
+        Args:
+            now: the frame.
+            rows: of the sets, shape (n,), int.
+            seconds: before which the eye cannot be there, ascending, shape (n,).
+        """
+        starts, items, owners = self.sets.starts, self.sets.items, self.shelves.owners
+        soonest = np.full(len(self.shelves.sizes), np.inf)
+        # The nearest last: the soonest stays.
+        for row, time in zip(rows[::-1].tolist(), seconds[::-1].tolist(), strict=True):
+            soonest[items[starts[row] : starts[row + 1]]] = time
+        found = np.flatnonzero(soonest < np.inf)
+        own = owners[found]
         listed = np.zeros(len(self.balls.radii), bool)
-        listed[owners] = True
-        ids, turning = np.flatnonzero(listed), np.zeros(len(self.balls.radii))
+        listed[own[own >= 0]] = True
+        ids, turning = np.flatnonzero(listed), np.zeros(len(listed) + 1)
         turning[ids] = turn_seconds(self.balls.take(ids), now.eye, now.forward, self.half_angle, self.motion)
-        return entries, np.maximum(seconds[place], turning[owners])
+        # What objects share is in place -1, at 0.
+        return found, np.maximum(soonest[found], turning[own])
 
     def shown_items(self, now: Now) -> np.ndarray:
         """What the frame shows: coarsest and wanted levels of all objects, those with the most pixels a byte first.
@@ -151,9 +163,9 @@ class AsPublished(Policy):
             claimed[fresh] = True
             left -= int(stock.shelves.sizes[fresh].sum())
             count += 1
-        entries, times = stock.entry_times(now, now.rows[:count], now.seconds[:count])
+        found, times = stock.item_times(now, now.rows[:count], now.seconds[:count])
         shown = stock.shown_items(now)
-        items = np.concatenate([shown, stock.sets.items[entries]])
+        items = np.concatenate([shown, found])
         times = np.concatenate([np.zeros(len(shown)), times])
         return first_of_each(items[np.lexsort((times, steps[items]))])
 
@@ -169,13 +181,12 @@ class CoarseFirst(Policy):
     def ahead(self, now: Now) -> np.ndarray:
         """By level from the coarsest, then by time."""
         stock, steps = self.stock, self.stock.shelves.steps
-        entries, times = stock.entry_times(now, now.rows, now.seconds)
-        soonest = np.full(len(steps), np.inf)
-        np.minimum.at(soonest, stock.sets.items[entries], times)
+        found, times = stock.item_times(now, now.rows, now.seconds)
         shown = stock.shown_items(now)
-        soonest[shown] = np.inf
-        later = np.flatnonzero(soonest < np.inf)
-        later = later[np.lexsort((soonest[later], steps[later]))]
+        now_shown = np.zeros(len(steps), bool)
+        now_shown[shown] = True
+        late = ~now_shown[found]
+        later = found[late][np.lexsort((times[late], steps[found[late]]))]
         return stock.cut(np.concatenate([shown, later]), SHARE * stock.capacity)
 
 

@@ -22,6 +22,7 @@ class Shelves:
         sizes: bytes of each item, int64.
         faces: of each item, int64.
         steps: of each item, levels from its object's coarsest, the fewest if objects share it, int64.
+        owners: object of each item, -1 if several share it, or none has it, int64.
     """
 
     starts: np.ndarray
@@ -30,6 +31,7 @@ class Shelves:
     sizes: np.ndarray
     faces: np.ndarray
     steps: np.ndarray
+    owners: np.ndarray
 
     @classmethod
     def of(cls, starts: np.ndarray, items: np.ndarray, sizes: np.ndarray, faces: np.ndarray) -> "Shelves":
@@ -40,7 +42,10 @@ class Shelves:
         table[owner, level] = items
         steps = np.full(len(sizes), np.iinfo(np.int64).max)
         np.minimum.at(steps, items, counts[owner] - 1 - level)
-        return cls(starts, items, table, sizes, faces, steps)
+        owners = np.full(len(sizes), -1)
+        owners[items] = owner
+        owners[np.bincount(items, minlength=len(sizes)) != 1] = -1
+        return cls(starts, items, table, sizes, faces, steps, owners)
 
     @cached_property
     def counts(self) -> np.ndarray:

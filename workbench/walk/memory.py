@@ -1,7 +1,7 @@
 """The memory of a walk, frame by frame: what has arrived, what is looked ahead to, asked for and given up."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,11 +75,22 @@ def gap_bytes(line: Line) -> int:
 
 
 def urgent_first(items: np.ndarray, shown: np.ndarray, layout: Layout, gap: int) -> list[Range]:
-    """Ranges of items; those that are shown now come first, and are not held up by what lies beside them."""
+    """Ranges of items; those that are shown now come first, and are not held up by what lies beside them.
+
+    Others that lie between them come along.
+    """
     urgent = np.isin(items, shown)
-    return [
-        one for part in (items[urgent], items[~urgent]) for one in ranges_of(part, layout.offsets, layout.sizes, gap)
-    ]
+    first = ranges_of(items[urgent], layout.offsets, layout.sizes, gap)
+    rest = items[~urgent]
+    for place, one in enumerate(first):
+        at = layout.offsets[rest]
+        within = (at >= one.first) & (at + layout.sizes[rest] <= one.first + one.size)
+        if within.any():
+            along = rest[within]
+            waste = one.waste - int(layout.sizes[along].sum())
+            first[place] = replace(one, items=tuple(sorted({*one.items, *along.tolist()})), waste=waste)
+            rest = rest[~within]
+    return first + ranges_of(rest, layout.offsets, layout.sizes, gap)
 
 
 class Memory:

@@ -67,11 +67,7 @@ class Tally:
         self._asked: list[np.ndarray] = []
         shelves = self._shelves
         # Of items of one object alone, which is quicker to count.
-        owners = np.repeat(np.arange(len(shelves.counts)), shelves.counts)
-        self._owner = None
-        if len(np.unique(shelves.items)) == len(shelves.items):
-            self._owner = np.full(len(shelves.sizes), -1)
-            self._owner[shelves.items] = owners
+        self._owner = shelves.owners if (shelves.owners[shelves.items] >= 0).all() else None
 
     def add(self, shown: Shown, stored: Stored, render_s: float, late_s: float) -> None:
         """A frame."""

@@ -23,6 +23,10 @@ def test_vectors():
     assert take(cache, 2, [2, 0, 4]) == ([4], [1, 3]) and cache.used == 90
     # What is looked ahead to is not given up for what comes behind it.
     assert take(cache, 3, [2, 0, 4, 3]) == ([], []) and cache.used == 90
+    # What was looked ahead to longest ago goes first.
+    aged = Cache(SIZES, 70)
+    assert [take(aged, frame, [frame])[1] for frame in range(3)] == [[], [], []]
+    assert take(aged, 3, [3]) == ([3], [0, 1])
     # So much in a frame; the first one may be larger.
     assert take(Cache(SIZES, 100), 0, [1, 2, 0], 50)[0] == [1, 2]
     assert take(Cache(SIZES, 100), 0, [3, 2], 5)[0] == [3]

@@ -17,6 +17,7 @@ def test_shelves():
     found = shelves()
     assert found.table.tolist() == [[0, -1, -1], [4, 3, 1], [5, 1, -1]]
     assert found.counts.tolist() == [1, 3, 2] and found.coarsest.tolist() == [0, 1, 1]
+    assert found.owners.tolist() == [0, -1, -1, 1, 1, 2]
     # Levels from the coarsest; nobody's item is never wanted.
     assert found.steps[[0, 1, 3, 4, 5]].tolist() == [0, 0, 1, 2, 1] and found.steps[2] > 100
 

@@ -72,6 +72,8 @@ def test_doorways_have_sets(office):
     assert known.has.sum() == len(known.cells) > office.graph.inhabitable.sum()
     views = office.sets["cell_id"].to_numpy()
     assert known.cells[: len(views)].tolist() == views.tolist()
+    between = known.cells[len(views) :]
+    assert known.potential[0][between].any(axis=1).all() and known.potential[1][between, between].all()
     starts, members = office.potential.ids()
     assert np.array_equal(known.starts[: len(starts)], starts) and np.array_equal(
         known.members[: len(members)], members

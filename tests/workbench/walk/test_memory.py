@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from viewcell.solvers.levels.benefit import NOTHING
 from viewcell.solvers.walk.set_items import Shelves
-from viewcell.workbench.walk.memory import FAILURES_MOST, GAP_BYTES, MISSING, Layout, Memory, gap_bytes
+from viewcell.workbench.walk.memory import FAILURES_MOST, GAP_BYTES, MISSING, Layout, Memory, gap_bytes, urgent_first
 from viewcell.workbench.walk.reader import Arrival, Line
 
 # Object 0 has the levels 0, 1, 2 and object 1 has 3.
@@ -113,6 +113,19 @@ def test_two_caches_keep_to_their_shares():
     # Coarsest levels are items 2 and 3.
     assert [cache.capacity for cache in held.caches] == [200, 200]
     assert sorted(found.read.tolist()) == [0, 1, 2, 3] and [cache.used for cache in held.caches] == [200, 200]
+
+
+def test_what_is_shown_comes_first_and_what_lies_between_comes_along():
+    layout = Layout(np.arange(6) * 100, np.full(6, 100), True)
+
+    def found(items, shown, gap):
+        ranges = urgent_first(np.array(items, int), np.array(shown, int), layout, gap)
+        return [(one.items, one.size, one.waste) for one in ranges]
+
+    assert found([5, 0, 1, 2], [2, 5], 0) == [((5,), 100, 0), ((2,), 100, 0), ((0, 1), 200, 0)]
+    assert found([0, 3, 1, 2], [0, 3], 200) == [((0, 1, 2, 3), 400, 0)]
+    assert found([0, 4, 1, 5], [0, 4], 300) == [((0, 1, 4), 500, 200), ((5,), 100, 0)]
+    assert found([0, 1], [], 0) == [((0, 1), 200, 0)] and found([], [3], 0) == []
 
 
 def test_gaps_are_as_wide_as_what_comes_in_the_time_of_a_read():
