@@ -3,6 +3,7 @@
 import base64
 import io
 import json
+import shutil
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,9 +13,10 @@ import pyarrow.csv
 
 from ...data.store.remote import is_remote
 from ...data.version import __version__
-from ..files import write_files
+from ..bake.place import alone
+from ..files import SCRATCH, write_files
 from ..pages import TEMPLATES, fill
-from .tables import Table, arrival_table, notes, tables, truth_table
+from .tables import Table, arrival_table, notes, policies, tables, truth_table
 from .tally import Walked
 
 
@@ -33,7 +35,7 @@ def write_walk(walked: Walked, out: Path) -> list[str]:
         Names of its files.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: the folder cannot be written, or another walk is being written there.
     """
     made: dict[str, bytes] = {}
 
@@ -51,13 +53,18 @@ def write_walk(walked: Walked, out: Path) -> list[str]:
         made["walk.html"] = page.encode()
         return made
 
-    write_files(out, make)
+    with alone(out, "walk"):
+        # What a killed walk has left: nobody else writes there now.
+        for left in out.glob(f"{SCRATCH}*"):
+            shutil.rmtree(left, ignore_errors=True)
+        write_files(out, make)
     return sorted(made)
 
 
 def _all(walked: Walked) -> list[Table]:
-    """Tables, what checks found last."""
-    return [*tables(walked), *([truth_table(walked), arrival_table(walked)] if walked.truths else [])]
+    """What sums it up, then the papers' tables."""
+    checked = [truth_table(walked), arrival_table(walked)] if walked.truths else []
+    return [policies(walked), *checked, *tables(walked)[:-1]]
 
 
 def _picture(walked: Walked) -> bytes | None:

@@ -142,7 +142,8 @@ def policies(walked: Walked) -> Table:
                 *mean_most(columns["claimed"] / MB, 2),
                 f"{columns['read_bytes'].sum() / MB:,.1f}",
                 f"{columns['reads'].sum():,}",
-                *mean_most(columns["skipped"], 0),
+                f"{columns['skipped'].mean():,.2f}",
+                f"{columns['skipped'].max():,}",
                 f"{100 * (columns['missing'] > 0).mean():.2f}",
                 f"{100 * (columns['missing'] + columns['skipped'] > 0).mean():.2f}",
                 f"{columns['failed'].sum():,}",
@@ -207,17 +208,21 @@ def arrival_table(walked: Walked) -> Table:
         ratios, never = one.ratios, np.isinf(one.asked).any(axis=1)
         cells = [one.policy]
         for column in range(2):
-            kb, ratio = np.median(one.asked[:, column]) / 1e3, ratios[:, column]
-            read = np.median(one.read[:, column]) / 1e3
-            # With "higher" no mean is made of what never comes.
-            most = np.quantile(ratio, 0.9, method="higher")
-            cells += [f"{kb:,.1f}", f"{np.median(ratio):.2f}", f"{most:.2f}", f"{read:,.1f}"]
+            asked, read, ratio = one.asked[:, column] / 1e3, one.read[:, column] / 1e3, ratios[:, column]
+            told = (asked, 0.5, 1), (ratio, 0.5, 2), (ratio, 0.9, 2), (read, 0.5, 1)
+            cells += [_quantile(*what) for what in told]
         rows.append((*cells, f"{never.sum():,}"))
     head = (
         *("policy", "kB to 99 %, median", "x oracle, median", "90 %", "with gaps, kB"),
         *("kB to 100 %, median", "x oracle, median", "90 %", "with gaps, kB", "eyes that never"),
     )
     return Table("From nothing to what the eye sees: bytes of items", head, rows)
+
+
+def _quantile(values: np.ndarray, share: float, digits: int) -> str:
+    """One of the values that so many are not above; in words where it never comes."""
+    found = float(np.quantile(values, share, method="higher"))
+    return f"{found:,.{digits}f}" if np.isfinite(found) else "never"
 
 
 def walk_text(walked: Walked) -> str:
