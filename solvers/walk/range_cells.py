@@ -12,11 +12,29 @@ from scipy.sparse.csgraph import dijkstra
 
 from ...data.graph import CellGraph
 
+# Portals of a cell between which all ways are measured; what is outside of a ragged building may have thousands.
+PORTALS_MOST = 200
+
 
 def box_distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Least distances between closed boxes, shapes (..., 2, 3) that broadcast; float64."""
     apart = np.maximum(np.maximum(a[..., 0, :] - b[..., 1, :], b[..., 0, :] - a[..., 1, :]), 0)
     return np.sqrt((apart * apart).sum(axis=-1))
+
+
+def _grouped(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Groups of boxes near each other, at most PORTALS_MOST: the group of each, and a box around each group."""
+    middles, size = boxes.mean(axis=1), 1.0
+    while True:
+        _, group = np.unique(np.floor(middles / size), axis=0, return_inverse=True)
+        group = group.ravel()
+        if group.max() < PORTALS_MOST:
+            break
+        size *= 2
+    around = np.stack([np.full((group.max() + 1, 3), np.inf), np.full((group.max() + 1, 3), -np.inf)], axis=1)
+    np.minimum.at(around[:, 0], group, boxes[:, 0])
+    np.maximum.at(around[:, 1], group, boxes[:, 1])
+    return group, around
 
 
 class RangeCells:
@@ -29,21 +47,30 @@ class RangeCells:
         starts, entries = graph.adjacency()
         self._starts, self._doors = starts.astype(np.int64), entries[:, 0].astype(np.int64)
         self._pairs = graph.portal_cells
-        rows, columns = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+        rows, columns, boxes = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [self._portals]
+        nodes = count
         for cell in range(self._tiles):
             own = self._doors[starts[cell] : starts[cell + 1]]
+            if len(own) > PORTALS_MOST:
+                # Groups of portals stand for them: between two of these no way is longer than between their portals.
+                group, around = _grouped(self._portals[own])
+                rows += [own, nodes + group]
+                columns += [nodes + group, own]
+                boxes.append(around)
+                own = np.arange(nodes, nodes + len(around))
+                nodes += len(around)
             rows.append(np.repeat(own, len(own)))
             columns.append(np.tile(own, len(own)))
-        row, column = np.concatenate(rows), np.concatenate(columns)
+        row, column, boxes = np.concatenate(rows), np.concatenate(columns), np.concatenate(boxes)
         # Two portals may belong to the same two cells: the pair counts once.
-        pairs = np.unique((row * max(1, count) + column)[row != column])
-        row, column = np.divmod(pairs, max(1, count))
+        pairs = np.unique((row * max(1, nodes) + column)[row != column])
+        row, column = np.divmod(pairs, max(1, nodes))
         # Room for the eye's row: it may see as many portals as cells have that meet.
-        room, size = np.zeros(count, np.int32), (count + 1, count + 1)
-        length = np.concatenate([box_distances(self._portals[row], self._portals[column]), room])
-        begins = np.append(np.searchsorted(row, np.arange(count + 1)), len(length)).astype(np.int32)
+        room, size = np.zeros(count, np.int32), (nodes + 1, nodes + 1)
+        length = np.concatenate([box_distances(boxes[row], boxes[column]), room])
+        begins = np.append(np.searchsorted(row, np.arange(nodes + 1)), len(length)).astype(np.int32)
         self._ways = csr_array((length, np.concatenate([column.astype(np.int32), room]), begins), shape=size)
-        self._begins = begins
+        self._begins, self._nodes = begins, nodes
 
     def near(self, eye: np.ndarray, holders: np.ndarray, reach_m: float) -> tuple[np.ndarray, np.ndarray]:
         """Cells that can be reached on a way of at most so long, and at least how long it is.
@@ -81,7 +108,7 @@ class RangeCells:
         own, first = own[near], first[near]
         self._ways.data[last : last + len(own)], self._ways.indices[last : last + len(own)] = first, own
         self._ways.indptr[-1] = last + len(own)
-        found = dijkstra(self._ways, indices=count, limit=reach_m)[:count]
+        found = dijkstra(self._ways, indices=self._nodes, limit=reach_m)[:count]
         reached = np.flatnonzero(found <= reach_m)
         for side in range(2):
             np.minimum.at(out, self._pairs[reached, side], found[reached])

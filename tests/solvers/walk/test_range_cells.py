@@ -7,6 +7,7 @@ import pytest
 from builders.random_buildings import SIZE, STEP, random_graph
 from builders.small_house import small_graph
 from viewcell.data.graph import CellGraph
+from viewcell.solvers.walk import range_cells
 from viewcell.solvers.walk.range_cells import RangeCells, box_distances
 
 M = 1 / 64
@@ -75,6 +76,23 @@ def test_the_shortest_ways_of_random_buildings(seed):
         cells, length = ways.near(eye, held, reach)
         assert np.array_equal(np.sort(cells), np.flatnonzero(wanted <= reach))
         np.testing.assert_allclose(length, wanted[cells], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("most", [1, 2, 4])
+def test_cells_with_many_portals_are_reached_no_later(most, monkeypatch):
+    """Groups of portals stand for them: lengths fall, never below 0, and never rise."""
+    graph, _ = random_graph(2, walls=5)
+    monkeypatch.setattr(range_cells, "PORTALS_MOST", most)
+    rng, ways, shorter = np.random.default_rng(2), RangeCells(graph, M), 0
+    for _ in range(10):
+        eye = rng.uniform(0, SIZE * STEP, 3) * M
+        held = holders(graph, eye)
+        wanted = plain(graph, eye, held)
+        cells, length = ways.near(eye, held, 1e6)
+        assert set(np.flatnonzero(np.isfinite(wanted)).tolist()) <= set(cells.tolist())
+        assert (length >= 0).all() and (length <= wanted[cells] + 1e-9).all()
+        shorter += int((length < wanted[cells] - 1e-9).sum())
+    assert shorter > 0
 
 
 def test_never_longer_than_a_walk():
