@@ -5,7 +5,7 @@ BIN := .venv/bin
 PAGE := workbench/view/page
 VIEWER := $(PAGE)/build/viewer.js
 
-.PHONY: install run test test-slow mutants lint docs clean
+.PHONY: install run walk test test-slow mutants lint docs clean
 
 install: .venv/installed $(VIEWER)
 
@@ -28,6 +28,15 @@ run: install
 	$(BIN)/viewcell bake out/office.scene --out out/office --overwrite
 	$(BIN)/viewcell verify out/office
 	$(BIN)/viewcell report out/office
+
+# An office of the size of Soda Hall, from the model to a walk that is checked (out/soda.tour), and to the papers' tables
+# with all policies, a triangle as large as published (out/papers.tour).
+walk: install
+	$(BIN)/viewcell make office --like soda-hall --out out/soda.scene --overwrite
+	$(BIN)/viewcell bake out/soda.scene --lods --out out/soda.bake --overwrite
+	$(BIN)/viewcell pack out/soda.bake --flatten --out out/soda.walk --overwrite
+	$(BIN)/viewcell walk out/soda.walk --check 20
+	$(BIN)/viewcell walk out/soda.walk --policy all --polygon-bytes 158 --out out/papers.tour
 
 # Stealing work leaves tests of a file in one process, so what they share is made once.
 test: install

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .workbench.pack.run import pack
     from .workbench.report.run import report
     from .workbench.view.run import view
+    from .workbench.walk.run import walk
 
 _HOME = {
     "Bake": "viewcell.workbench.baked",
@@ -40,6 +41,7 @@ _HOME = {
     "read": "viewcell.data.readers",
     "report": "viewcell.workbench.report.run",
     "view": "viewcell.workbench.view.run",
+    "walk": "viewcell.workbench.walk.run",
 }
 
 __all__ = [
@@ -58,6 +60,7 @@ __all__ = [
     "read",
     "report",
     "view",
+    "walk",
 ]
 
 

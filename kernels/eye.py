@@ -6,7 +6,8 @@ Past 2,000 portals, or 64 in a row, the frame starts over with rectangles of the
 Source: Funkhouser et al. 1996, section 4.2.1 (eye-to-cell and eye-to-object visibility).
 """
 
-from dataclasses import dataclass
+import threading
+from dataclasses import dataclass, field
 
 import numpy as np
 import warp as wp
@@ -20,7 +21,7 @@ from .cone import CONE_SIZE, POLYGON_SIZE, narrow_cone, screen_cone, side_of
 from .eye_marks import Eyes, EyeScene, Marks, axes_of, eye_of, has, mark, mark_contents, mark_set
 from .eye_screen import rectangles_scratch, screen_rectangles
 from .graph import DeviceGraph, device_graph
-from .launch import CPU, Device, Scratch, launch_slots
+from .launch import CPU, Device, Scratch, check_stopped, launch_slots, load_kernels
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -127,6 +128,23 @@ def _wedge(
         row += slots
 
 
+@dataclass
+class _Prepared:
+    """A launch for one eye on the CPU, and its arrays as NumPy sees them: to be filled, done again, and read."""
+
+    launch: wp.Launch
+    view: np.ndarray
+    holders: np.ndarray
+    words: np.ndarray
+
+
+class _Kept(threading.local):
+    """Prepared launches of a thread: arrays and structs that are made anew take longer than an eye does."""
+
+    def __init__(self) -> None:
+        self.launches: dict[tuple, _Prepared] = {}
+
+
 @dataclass(frozen=True)
 class EyeModel:
     """A model as eyes look into it; of `eye_model`.
@@ -138,6 +156,7 @@ class EyeModel:
         scene: on a device.
         device_graph: likewise.
         device: that holds them.
+        kept: launches for one eye, done again with other numbers.
     """
 
     graph: CellGraph
@@ -146,6 +165,7 @@ class EyeModel:
     scene: EyeScene
     device_graph: DeviceGraph
     device: Device
+    kept: _Kept = field(default_factory=_Kept, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -269,11 +289,48 @@ def _looked(
     device, (own, others) = model.device, _sizes(model)
     starts, cells = cells_holding(model.graph, views[:, 3])
     holders = np.concatenate([starts + len(starts), cells])
+    if len(views) == 1 and device.is_cpu:
+        return _looked_once(model, views, holders, half, limit, kernel, scratch)
     eyes = device.struct(Eyes, views=views, frame=wp.vec4d(*-half, *half), holders=holders, limit=limit)
     marks = device.struct(Marks, words=(len(views), own + others + 1), cells=32 * own, passed=own + others)
     inputs, most = [model.device_graph, model.scene, eyes], max(1, ROOM // scratch.values)
     launch_slots(kernel, len(views), inputs, scratch, [marks], device, gpu_chunk=most)
     return marks.words.numpy()
+
+
+def _looked_once(
+    model: EyeModel,
+    view: np.ndarray,
+    holders: np.ndarray,
+    half: np.ndarray,
+    limit: int,
+    kernel: wp.Kernel,
+    scratch: Scratch,
+) -> np.ndarray:
+    """The same for one view on the CPU, by a launch that is kept."""
+    check_stopped()
+    key = kernel.key, *half.tolist(), limit
+    kept = model.kept.launches.get(key)
+    if kept is None or len(kept.holders) < len(holders):
+        kept = _prepare(model, len(holders), half, limit, kernel, scratch)
+        model.kept.launches[key] = kept
+    kept.view[:], kept.holders[: len(holders)], kept.words[:] = view, holders, 0
+    kept.launch.launch()
+    return kept.words.copy()
+
+
+def _prepare(
+    model: EyeModel, room: int, half: np.ndarray, limit: int, kernel: wp.Kernel, scratch: Scratch
+) -> _Prepared:
+    """A launch with room for so many holders; its scratch is written before it is read, as by one row after another."""
+    device, (own, others) = model.device, _sizes(model)
+    load_kernels(kernel.module, device)
+    frame = wp.vec4d(*-half, *half)
+    eyes = device.struct(Eyes, views=np.zeros((1, 4, 3)), frame=frame, holders=np.zeros(room, int), limit=limit)
+    marks = device.struct(Marks, words=(1, own + others + 1), cells=32 * own, passed=own + others)
+    inputs = [model.device_graph, model.scene, eyes, 0, 1, 1, *scratch.arrays(1, device)]
+    launch = wp.launch(kernel, 1, inputs=inputs, outputs=[marks], device=device.name, record_cmd=True)
+    return _Prepared(launch, eyes.views.numpy(), eyes.holders.numpy(), marks.words.numpy())
 
 
 def _lists(words: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

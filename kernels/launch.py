@@ -157,6 +157,13 @@ def check_stopped() -> None:
         raise KeyboardInterrupt
 
 
+def load_kernels(module: wp.Module, device: Device) -> None:
+    """Compile or load the kernels of a module, one module at a time, whichever thread asks."""
+    # As a launch does: Module.load alone compiles a second variant on a CPU, for blocks of many threads.
+    with _LOADING:
+        wp.load_module(module, device=device.name)
+
+
 @dataclass(frozen=True)
 class Scratch:
     """What one slot needs: float64 values and integers."""
@@ -236,9 +243,7 @@ def run_sliced(
     if count == 0:
         return
     check_stopped()
-    # As a launch does: Module.load alone compiles a second variant on a CPU, for blocks of many threads.
-    with _LOADING:
-        wp.load_module(module, device=device.name)
+    load_kernels(module, device)
 
     def slotted(slots: int) -> tuple[object, ...]:
         return () if scratch is None else (slots, *scratch.arrays(slots, device))

@@ -15,6 +15,7 @@ from ..data.plural import counted
 from .results import as_json, bake_result, check_result, verify_result
 from .summary import summary, table
 from .terminal import FAILED, INTERRUPTED, complain, say
+from .walk.command import walk as walk
 
 if TYPE_CHECKING:
     from ..data.scene import Scene

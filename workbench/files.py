@@ -6,6 +6,9 @@ from pathlib import Path
 
 from ..data.errors import InputError
 
+# What folders are called in which files are made before they appear.
+SCRATCH = ".writing."
+
 
 def write_files(folder: Path, make: Callable[[], dict[str, bytes]]) -> None:
     """Write files by name into a folder, made if need be; each appears whole or not at all, in the order given.
@@ -17,7 +20,7 @@ def write_files(folder: Path, make: Callable[[], dict[str, bytes]]) -> None:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing.") as scratch:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=SCRATCH) as scratch:
             files = make()
             for name, data in files.items():
                 (Path(scratch) / name).write_bytes(data)

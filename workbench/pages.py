@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#a8437c", "#555555", "#56b4e9")
 MARKERS = ("o", "s", "^", "D", "P")
 Point = TypeVar("Point")
+# Templates that several commands share.
+TEMPLATES = files(__package__) / "templates"
 
 
 def pareto_front(points: Iterable[Point], of: Callable[[Point], tuple[float, float]]) -> list[Point]:
@@ -38,8 +40,7 @@ def png(figure: "Figure") -> bytes:
 
 def fill(folder: "Traversable", template: str, **parts: object) -> str:
     """A page from a template in a folder: `style` is that of all pages, text is escaped, markup goes in as `Markup`."""
-    own = files(__package__) / "templates"
-    style = (own / "base.css").read_text("utf-8")
+    style = (TEMPLATES / "base.css").read_text("utf-8")
     found = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True)
     return found.from_string((folder / template).read_text("utf-8")).render(style=Markup(style), **parts)
 
@@ -50,4 +51,4 @@ def html_page(
     """HTML in one file: a lead, the picture, a table, and notes; one of several lines is shown as it is."""
     parts = {"title": title, "head": head, "rows": rows, "notes": notes, "lead": lead}
     image = base64.b64encode(picture).decode()
-    return fill(files(__package__) / "templates", "table.html", picture=image, **parts)
+    return fill(TEMPLATES, "table.html", picture=image, **parts)

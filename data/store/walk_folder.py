@@ -18,10 +18,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..errors import InputError
+from ..graph import CellGraph
 from ..ragged import starts_of
 from ..runs import RunSets, decode
 from ..scene import Mesh
 from .framed import FramedFolder
+from .graph_folder import read_graph
 from .scene_folder import new_folder, one_line, read_manifest, read_table
 from .scene_tables import BOX_COLUMNS, colours_of, list_rows
 from .walk_tables import SHORT, item_size
@@ -39,6 +41,8 @@ COLUMNS = {
     "cells": ("cell_id", *BOX_COLUMNS, "inhabitable", "name"),
     "portals": ("portal_id", "cell_a", "cell_b", "axis", "coordinate", "min_u", "max_u", "min_v", "max_v"),
 }
+# What is read before the first frame: all but the geometry.
+INDEX_FILES = tuple(f"{name}.parquet" for name in COLUMNS)
 MANIFEST_KEYS = ("bake", "grid_m", "origin", "yaw_deg", "flattened", "counts", "files")
 # Tables of a bake that a pack is made of.
 SOURCES = ("meshes", "objects", "cells", "portals", "cell_to_cell", "cell_to_object", "cell_lods")
@@ -77,6 +81,29 @@ class WalkFolder(FramedFolder):
         """Portals, as in the bake."""
         return self._table("portals")
 
+    @property
+    def claims_cells(self) -> bool:
+        """Whether the bake says which cells see each other; one of view cells, which may overlap, does not."""
+        return not self.sets["cells"].null_count
+
+    @cached_property
+    def graph(self) -> CellGraph:
+        """Cells by cell_id, and portals [grid steps].
+
+        Raises:
+            InputError: the tables contradict each other.
+        """
+        return read_graph(self.folder, self.grid_m, disjoint=self.claims_cells)[0]
+
+    @cached_property
+    def boxes(self) -> np.ndarray:
+        """Boxes by display id [grid steps], shape (objects, 2, 3), int64; low above high for one that is nowhere."""
+        metres = np.column_stack([self.objects[name].to_numpy() for name in BOX_COLUMNS]).reshape(-1, 2, 3)
+        nowhere = np.isnan(metres).any(axis=(1, 2))
+        steps = np.round(np.where(nowhere[:, None, None], 0.0, metres) / self.grid_m).astype(np.int64)
+        steps[nowhere, 0] = 1
+        return steps
+
     @cached_property
     def sets(self) -> pa.Table:
         """A row for each view cell, by cell_id: codes of its sets, and bytes of the items that it may need."""
@@ -95,7 +122,27 @@ class WalkFolder(FramedFolder):
     @cached_property
     def potential_cells(self) -> RunSets | None:
         """Rows of `cells` that may be visible, for each row of `sets`; None if the bake claims nothing of cells."""
-        return None if self.sets["cells"].null_count else self._runs("cells", self.cells.num_rows)
+        return self._runs("cells", self.cells.num_rows) if self.claims_cells else None
+
+    def matrices(self) -> tuple[np.ndarray, np.ndarray]:
+        """What may be seen from each cell, by its id: objects, shape (cells, objects), and cells, (cells, cells), bool.
+
+        Rows of cells that are no view cells are empty. All cells where nothing is claimed of them.
+        """
+        graph, views = self.graph, self.sets["cell_id"].to_numpy()
+        objects = np.zeros((graph.cell_count, self.objects.num_rows), bool)
+        cells = np.zeros((graph.cell_count, graph.cell_count), bool)
+        starts, ids = self.potential.ids()
+        objects[np.repeat(views, np.diff(starts)), ids] = True
+        if self.potential_cells is None:
+            cells[views] = True
+            return objects, cells
+        starts, rows = self.potential_cells.ids()
+        cells[np.repeat(views, np.diff(starts)), self.cells["cell_id"].to_numpy()[rows]] = True
+        beside = np.arange(graph.cell_count) >= graph.tile_count
+        cells[views[beside[views]]] = True
+        cells[views[:, None], np.flatnonzero(beside)] = True
+        return objects, cells
 
     @cached_property
     def limits(self) -> np.ndarray:
@@ -136,22 +183,21 @@ class WalkFolder(FramedFolder):
         if len(data) != row["size"]:
             where = f"{self.folder / GEOMETRY}: expected {row['size']} bytes of item {item}"
             raise InputError(f"{where}, found {len(data)}")
-        split = 12 * row["vertices"]
-        vertices = np.frombuffer(data[:split], "<f4").reshape(-1, 3).astype(np.float64)
-        kind = "<u2" if row["vertices"] <= SHORT else "<u4"
-        faces = np.frombuffer(data[split:], kind).reshape(-1, 3).astype(np.int32)
-        if faces.size and faces.max() >= len(vertices):
-            raise InputError(f"{self.folder / GEOMETRY}: expected vertices below {len(vertices)} in item {item}")
+        vertices, faces = item_mesh(data, row["vertices"], f"{self.folder / GEOMETRY}: item {item}")
         colours = colours_of(self.items.slice(item, 1), [faces])[0]
         return Mesh(vertices, faces, row["error_m"], colours)
 
     def stale(self) -> str:
         """One line if the bake that it was packed from has changed since; empty if not, or if it is not there."""
-        bake = self.manifest["bake"]
-        place = Path(os.path.normpath(self.folder.absolute() / ".." / bake["path"]))
-        if not (place / "manifest.json").is_file() or bake_digest(place) == bake["sha256"]:
+        place = self.bake_place
+        if not (place / "manifest.json").is_file() or bake_digest(place) == self.manifest["bake"]["sha256"]:
             return ""
         return f"{self.folder}: its bake {place} has changed since; viewcell pack packs it anew"
+
+    @property
+    def bake_place(self) -> Path:
+        """Where the bake that it was packed from was then."""
+        return Path(os.path.normpath(self.folder.absolute() / ".." / self.manifest["bake"]["path"]))
 
     def _runs(self, name: str, count: int) -> RunSets:
         try:
@@ -160,8 +206,12 @@ class WalkFolder(FramedFolder):
             raise InputError(f"{self.folder / 'sets.parquet'}: {name}: {error}") from None
 
 
-def read_walk(folder: str | Path) -> WalkFolder:
+def read_walk(folder: str | Path, *, geometry: bool = True) -> WalkFolder:
     """Open a display database: every file is as it was written, and all numbers name what there is.
+
+    Args:
+        folder: of `viewcell pack`.
+        geometry: False if geometry.bin is elsewhere: everything else is checked.
 
     Raises:
         InputError: it is none, of another format version, unfinished, or a file is missing, cut short or altered.
@@ -172,10 +222,11 @@ def read_walk(folder: str | Path) -> WalkFolder:
     if missing:
         raise InputError(f"{folder / 'manifest.json'}: expected the key {missing[0]!r}, found none")
     try:
-        for name in (*(f"{table}.parquet" for table in COLUMNS), GEOMETRY):
+        for name in (*INDEX_FILES, GEOMETRY):
             if name not in manifest["files"]:
                 raise InputError(f"{folder / 'manifest.json'}: expected a checksum of {name}, found none")
-            _check_file(folder / name, manifest["files"][name])
+            if geometry or name != GEOMETRY:
+                _check_file(folder / name, manifest["files"][name])
         walk = WalkFolder(folder, manifest)
         _check_numbers(walk)
     except InputError:
@@ -183,6 +234,25 @@ def read_walk(folder: str | Path) -> WalkFolder:
     except (ValueError, TypeError, KeyError, pa.ArrowException) as error:
         raise InputError(f"{folder}: expected a readable display database, found {one_line(error)}") from None
     return walk
+
+
+def item_mesh(data: bytes, vertex_count: int, where: str) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices [m], float64, and faces, int32, of an item's bytes.
+
+    Raises:
+        InputError: they are of other numbers of vertices and faces, or a face names no vertex.
+    """
+    split = 12 * vertex_count
+    kind = np.dtype("<u2" if vertex_count <= SHORT else "<u4")
+    if len(data) < split or (len(data) - split) % (3 * kind.itemsize):
+        raise InputError(f"{where}: expected {vertex_count} vertices and whole faces, found {len(data)} bytes")
+    vertices = np.frombuffer(data, "<f4", 3 * vertex_count).reshape(-1, 3).astype(np.float64)
+    faces = np.frombuffer(data, kind, offset=split).reshape(-1, 3).astype(np.int32)
+    if faces.size and faces.max() >= vertex_count:
+        raise InputError(f"{where}: expected vertices below {vertex_count}, found {faces.max()}")
+    if not np.isfinite(vertices).all():
+        raise InputError(f"{where}: expected finite vertices, found others")
+    return vertices, faces
 
 
 def _check_file(path: Path, known: dict) -> None:
@@ -198,7 +268,7 @@ def _check_file(path: Path, known: dict) -> None:
 
 def _check_numbers(walk: WalkFolder) -> None:
     """Every number names what there is, as far as tables tell."""
-    items, file_size = walk.items, (walk.folder / GEOMETRY).stat().st_size
+    items, file_size = walk.items, walk.manifest["files"][GEOMETRY]["bytes"]
     at, size, corners, faces = (items[name].to_numpy() for name in ("offset", "size", "vertices", "faces"))
     within = (at >= 0) & (at + size <= file_size) & (size == item_size(corners, faces))
     if not within.all():

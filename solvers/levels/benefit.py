@@ -107,20 +107,29 @@ def find_tuples(scene: Scene, settings: BenefitSettings) -> Tuples:
 
     Levels whose cost does not fall from the last kept one, and levels without faces, are left out and counted.
     """
+    levels = [[(len(mesh.faces), mesh.error_m) for mesh in shape.lods] for shape in scene.definitions]
+    objects = [(placed.definition_id, placed.kind) for placed in scene.objects]
+    return tuples_of(levels, objects, settings)
+
+
+def tuples_of(
+    levels: Sequence[Sequence[tuple[int, float]]], objects: Sequence[tuple[int, str]], settings: BenefitSettings
+) -> Tuples:
+    """As `find_tuples`, of faces and deviations [m] of the levels of each shape, and shape and kind of each object."""
     shapes, left_out = [], 0
-    for shape in scene.definitions:
+    for own in levels:
         kept: list[tuple[int, int, float]] = []
-        for lod, mesh in enumerate(shape.lods):
-            if len(mesh.faces) and (not kept or len(mesh.faces) < kept[-1][1]):
-                kept.append((lod, len(mesh.faces), mesh.error_m))
-        left_out += len(shape.lods) - len(kept)
+        for lod, (faces, error_m) in enumerate(own):
+            if faces and (not kept or faces < kept[-1][1]):
+                kept.append((lod, faces, error_m))
+        left_out += len(own) - len(kept)
         shapes.append([(lod, a, n, error) for lod, n, error in kept for a in range(len(settings.algorithms))])
     rows, starts, faceless = [], [0], 0
-    for object_id, placed in enumerate(scene.objects):
-        own = shapes[placed.definition_id]
+    for object_id, (shape, kind) in enumerate(objects):
+        own = shapes[shape]
         faceless += not own
         rows += [(object_id, *row) for row in own]
-        if not own or placed.kind not in settings.always:
+        if not own or kind not in settings.always:
             rows.append((object_id, NOTHING, 0, 0, 0.0))
         starts.append(len(rows))
     table = np.array(rows, np.float64).reshape(-1, 5)
@@ -160,7 +169,21 @@ def find_sightings(scene: Scene, path: CameraPath, screen: Screen, sets: np.ndar
     """
     boxes = scene.object_bounds() * scene.grid_m
     solid = (boxes[:, 0] <= boxes[:, 1]).all(axis=1)
-    frame, object_id = np.nonzero(sets & solid)
+    return sightings_of(boxes, path, screen, *np.nonzero(sets & solid))
+
+
+def sightings_of(
+    boxes: np.ndarray, path: CameraPath, screen: Screen, frame: np.ndarray, object_id: np.ndarray
+) -> Sightings:
+    """As `find_sightings`, of pairs of frame and object, ascending by both.
+
+    Args:
+        boxes: of all objects [m], shape (objects, 2, 3), float64.
+        path: the frames.
+        screen: gives the frustum.
+        frame: place in the path, shape (n,), int.
+        object_id: whose box is somewhere, shape (n,), int.
+    """
     axes = path.axes()
     rectangles, inside = on_screen(screen, project_boxes(screen, path.eyes[frame], axes[frame], boxes[object_id]))
     frame, object_id, rectangles = frame[inside], object_id[inside], rectangles[inside]
@@ -268,6 +291,18 @@ def find_candidates(
     scene: Scene, tuples: Tuples, sightings: Sightings, screen: Screen, settings: BenefitSettings
 ) -> Candidates:
     """Benefit of every tuple of every sighting."""
+    return candidates_of(importance_of([o.kind for o in scene.objects], settings), tuples, sightings, screen, settings)
+
+
+def importance_of(kinds: Sequence[str], settings: BenefitSettings) -> np.ndarray:
+    """Factor of each object by its kind, float64."""
+    return np.array([settings.importance.get(kind, 1.0) for kind in kinds])
+
+
+def candidates_of(
+    importance: np.ndarray, tuples: Tuples, sightings: Sightings, screen: Screen, settings: BenefitSettings
+) -> Candidates:
+    """As `find_candidates`, of the importance of each object, shape (objects,), float64."""
     count = np.diff(tuples.starts)[sightings.object_id]
     starts = np.append(0, np.cumsum(count))
     sighting = np.repeat(np.arange(len(count)), count)
@@ -282,9 +317,8 @@ def find_candidates(
         accuracy = accuracy_by_samples(np.maximum(primitives, 1), exponent, settings.base_error)
     else:
         accuracy = accuracy_by_error(tuples.error_m[chosen], sightings.distance_m[sighting], screen.focal)
-    kinds = np.array([settings.importance.get(placed.kind, 1.0) for placed in scene.objects])
     pixels = sightings.pixels[sighting]
-    benefit = pixels * accuracy * factor * kinds[sightings.object_id[sighting]]
+    benefit = pixels * accuracy * factor * importance[sightings.object_id[sighting]]
     benefit *= focus_factor(sightings.off_middle, settings.edge_focus)[sighting]
     benefit *= motion_factor(sightings.speed[sighting], pixels, primitives, settings.motion)
     return Candidates(starts, chosen, rank, np.where(drawn, benefit, 0.0), np.where(drawn, pixels, 0.0))

@@ -18,6 +18,8 @@ from .benefit import Candidates, Sightings, hysteresis_factor
 
 # Hysteresis that slack is spent on, strongest first.
 STRONG = (0.95, 0.6)
+# More than the sum of a frame's benefits is rounded by.
+ROUNDING = 2.0**-40
 # benefits (1, levels), costs, starts, budget, level of each object in the last frame or -1 -> level of each object.
 Chooser = Callable[[np.ndarray, np.ndarray, np.ndarray, int, np.ndarray], np.ndarray]
 
@@ -141,26 +143,17 @@ def select_frames(
     Raises:
         InputError: a strength or slack out of its range, or as `launch_select`.
     """
-    if not (0 <= coherence.hysteresis < 1 and 0 <= coherence.slack < 1):
-        raise InputError(f"coherence: expected hysteresis and slack from 0, below 1; found {coherence}")
+    keeper = LevelKeeper(int(sightings.object_id.max(initial=-1)) + 1, choose, coherence)
     frames = np.arange(len(sightings.starts) - 1) if frames is None else np.asarray(frames)
-    objects = int(sightings.object_id.max(initial=-1)) + 1
-    last = np.full(objects, -1)  # rank in the last frame
     chosen, rows = np.full(len(sightings.object_id), -1), []
     for at in frames:
         whole = frame_problem(sightings, candidates, int(at))
         begun = time.perf_counter()
-        problem, dropped = fitting(whole, candidates.benefit, cost, budget)
-        picked, kept = _choose(problem, candidates, cost, budget, choose, coherence, last)
+        found = keeper.choose(whole, candidates, cost, budget)
         spent = time.perf_counter() - begun
-        chosen[problem.sightings] = picked
-        rank = candidates.rank[picked]
-        changed = (last[problem.objects] >= 0) & (last[problem.objects] != rank)
-        # What leaves the view and comes back is free to come back as anything.
-        last[:] = -1
-        last[problem.objects] = rank
-        total = candidates.benefit[picked].sum(), cost[picked].sum()
-        rows.append((*total, changed.sum(), len(whole.objects), kept, dropped, spent))
+        chosen[found.sightings] = found.picked
+        total = candidates.benefit[found.picked].sum(), cost[found.picked].sum()
+        rows.append((*total, found.switches, len(whole.objects), found.kept, found.dropped, spent))
         progress()
     value, costs, switches, shown, kept, dropped, seconds = (
         np.array(column, kind)
@@ -169,6 +162,56 @@ def select_frames(
         )
     )
     return PathChoice(chosen, frames, value, costs, switches, shown, kept, dropped, seconds)
+
+
+@dataclass(frozen=True)
+class FrameChoice:
+    """What was chosen for one frame.
+
+    Attributes:
+        sightings: numbers of those that are drawn, shape (g,).
+        picked: candidate of each, shape (g,), int64.
+        switches: objects of both this frame and the one before whose tuple changed.
+        kept: whether all levels of the frame before were kept.
+        dropped: objects that must be drawn and did not fit.
+    """
+
+    sightings: np.ndarray
+    picked: np.ndarray
+    switches: int
+    kept: bool
+    dropped: int
+
+
+class LevelKeeper:
+    """Chooses levels for one frame after another, and knows those of the frame before."""
+
+    def __init__(self, objects: int, choose: Chooser, coherence: Coherence) -> None:
+        """For so many objects.
+
+        Raises:
+            InputError: a strength or slack out of its range.
+        """
+        if not (0 <= coherence.hysteresis < 1 and 0 <= coherence.slack < 1):
+            raise InputError(f"coherence: expected hysteresis and slack from 0, below 1; found {coherence}")
+        self._choose, self._coherence = choose, coherence
+        # Rank of each object's tuple in the last frame.
+        self._last = np.full(objects, -1)
+
+    def choose(self, whole: Frame, candidates: Candidates, cost: np.ndarray, budget: int) -> FrameChoice:
+        """The next frame; arguments as of `select_frames`.
+
+        Raises:
+            InputError: as `launch_select`.
+        """
+        problem, dropped = fitting(whole, candidates.benefit, cost, budget)
+        picked, kept = _choose(problem, candidates, cost, budget, self._choose, self._coherence, self._last)
+        rank, last = candidates.rank[picked], self._last
+        changed = (last[problem.objects] >= 0) & (last[problem.objects] != rank)
+        # What leaves the view and comes back is free to come back as anything.
+        last[:] = -1
+        last[problem.objects] = rank
+        return FrameChoice(problem.sightings, picked, int(changed.sum()), kept, dropped)
 
 
 def _choose(
@@ -185,7 +228,9 @@ def _choose(
         return np.zeros(0, np.int64), False
     if coherence.slack > 0 and (last[problem.objects] >= 0).any():
         enough = (1 - coherence.slack) * certified_bound(problem, candidates, cost, budget)
-        before = np.repeat(last[problem.objects], np.diff(problem.starts))
+        # A level that may not be chosen any more cannot be kept.
+        place = _place(candidates.rank[problem.candidates], problem.starts, last[problem.objects])
+        before = np.repeat(np.where(place >= 0, last[problem.objects], -1), np.diff(problem.starts))
         tight = problem.only((before < 0) | (candidates.rank[problem.candidates] == before))
         if np.minimum.reduceat(cost[tight.candidates], tight.starts[:-1]).sum() <= budget:
             picked = _solve(tight, candidates, cost, budget, choose, 0.0, last)
@@ -203,7 +248,28 @@ def certified_bound(problem: Frame, candidates: Candidates, cost: np.ndarray, bu
     if not len(problem.sightings):
         return 0.0
     ids = problem.candidates
-    return float(launch_select(candidates.benefit[ids][None], cost[ids], problem.starts, budget).bound[0])
+    benefit = candidates.benefit[ids]
+    best = best_of_all(benefit, cost[ids], problem.starts, budget)
+    if best is not None:
+        return float(benefit[problem.starts[:-1] + best].sum() * (1 + ROUNDING))
+    return float(launch_select(benefit[None], cost[ids], problem.starts, budget).bound[0])
+
+
+def best_of_all(benefit: np.ndarray, cost: np.ndarray, starts: np.ndarray, budget: int) -> np.ndarray | None:
+    """The most beneficial level of each object, of equals the cheapest, then the first; None if they do not all fit.
+
+    Args:
+        benefit: of each level, shape (levels,), float64.
+        cost: of each level, int64.
+        starts: levels of object g are starts[g] : starts[g + 1], at least one.
+        budget: that all may cost.
+
+    Returns:
+        Place of each among its object's levels, shape (objects,), int64: the optimum, for no choice is worth more.
+    """
+    owners = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    best = np.lexsort((cost, -benefit, owners))[starts[:-1]]
+    return best - starts[:-1] if cost[best].sum() <= budget else None
 
 
 def _solve(

@@ -226,6 +226,26 @@ def test_threads_and_lots_change_nothing(monkeypatch):
             np.testing.assert_array_equal(getattr(got, name), wanted)
 
 
+@pytest.mark.parametrize("limit", [2000, 3, 0])
+def test_one_eye_at_a_time_sees_the_same(limit):
+    """The launch for one eye is kept and done again: what eyes before it saw, and where, leaves no trace."""
+    graph, _ = random_graph(1, walls=5)
+    rng = np.random.default_rng(2)
+    # On portals, edges and corners, which several cells hold, and anywhere.
+    eyes = np.concatenate([edge_eyes(graph, 0), rng.uniform(1, SIZE * STEP - 1, (40, 3))])
+    path = camera(eyes, rng.uniform(0, 360, len(eyes)))
+    model = eye_model(graph, random_boxes(rng, 50), 1.0)
+    wanted = launch_eye(model, path, WIDE, limit=limit)
+    for frame in range(len(path)):
+        one = replace(path, **{name: column[frame : frame + 1] for name, column in vars(path).items()})
+        for screen, most in ((SQUARE, limit), (WIDE, limit + 7), (WIDE, limit)):
+            got = launch_eye(model, one, screen, limit=most)
+        for starts, ids in (("starts", "objects"), ("cell_starts", "cells")):
+            own = slice(*getattr(wanted, starts)[frame : frame + 2])
+            np.testing.assert_array_equal(getattr(got, ids), getattr(wanted, ids)[own])
+        assert got.sequences[0] == wanted.sequences[frame]
+
+
 def test_no_frames_and_no_objects():
     graph = row_of_rooms((-500, 500, -500, 500))
     path = camera([[0, 0, 0]], 0)

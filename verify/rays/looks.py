@@ -73,16 +73,34 @@ class Eyewitness:
         for frame in np.flatnonzero(free).tolist():
             spots = np.column_stack([rng.uniform(-half, half, (rays, 2)), np.ones(rays)]) @ axes[frame]
             along = (spots / np.linalg.norm(spots, axis=1)[:, None]).astype(np.float32)
-            objects, reach, ray = self._met(np.repeat(eyes[frame][None], rays, axis=0).astype(np.float32), along)
-            seen = np.unique(objects)
-            lacking = np.flatnonzero(~np.isin(seen, kept[frame]))
-            sure = np.zeros(len(seen), bool)
-            for place in lacking:
-                # Another ray may meet it better than the first.
-                for row in np.flatnonzero(objects == seen[place])[:50]:
-                    end = eyes[frame] + along[ray[row]].astype(float) * float(reach[row]) * OVERSHOOT
-                    sure[place] |= self._is_seen(int(seen[place]), eyes[frame], end)
-            yield Look(frame, seen, seen[sure], seen[lacking][~sure[lacking]])
+            yield Look(frame, *self.look(eyes[frame], along, kept[frame]))
+
+    def look(self, eye: np.ndarray, along: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Cast rays from an eye.
+
+        Args:
+            eye: outside of solids [grid steps], shape (3,), float64.
+            along: directions of unit length, shape (n, 3), float32.
+            kept: objects that the eye is said to see, ascending.
+
+        Returns:
+            Objects that rays met, ascending; those of them that are not kept and that exact sightlines confirm; and
+            those that are not kept and that these meet at edges only, or not at all.
+        """
+        objects, reach, ray = self._met(np.repeat(eye[None], len(along), axis=0).astype(np.float32), along)
+        seen = np.unique(objects)
+        lacking = np.flatnonzero(~np.isin(seen, kept))
+        sure = np.zeros(len(seen), bool)
+        for place in lacking:
+            # Another ray may meet it better than the first.
+            for row in np.flatnonzero(objects == seen[place])[:50]:
+                end = eye + along[ray[row]].astype(float) * float(reach[row]) * OVERSHOOT
+                sure[place] |= self._is_seen(int(seen[place]), eye, end)
+        return seen, seen[sure], seen[lacking][~sure[lacking]]
+
+    def outside_solids(self, eyes: np.ndarray) -> np.ndarray:
+        """Whether eyes are outside of all solids, so that they see anything [grid steps], shape (n, 3); bool."""
+        return self.lines.outside_solids(eyes)
 
     def _met(self, origins: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Object, parameter and ray of everything that rays meet up to the first opaque thing."""

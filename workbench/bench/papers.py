@@ -6,7 +6,6 @@ Run `python -m viewcell.workbench.bench papers --out docs/papers.md` (some minut
 import argparse
 import tempfile
 import time
-from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 
@@ -26,7 +25,7 @@ from ...data.prepared import PreparedModel
 from ...data.scene import OPAQUE, Role, Scene
 from ...data.store.scene_folder import write_scene
 from ...data.store.view_cells import write_view_cells
-from ...kernels.eye import eye_model, launch_eye
+from ...data.store.walk_folder import read_walk
 from ...solvers.levels.benefit import find_sightings
 from ...solvers.visibility.projection import (
     VlodSettings,
@@ -40,13 +39,13 @@ from ..bake.run import bake
 from ..bake.settings import Settings
 from ..baked import Bake
 from ..pack.run import pack
-from ..walk.path import walk
+from ..walk.settings import ALL, WalkSettings
+from .lines import NONE, Line, mean_max
 from .occlusion import sample_cells
 from .storage import AS_PACKED, SAMPLED_ORDER, SCHEME, TOUR, measure_storage
 from .timing import commit
+from .walk import FRAMES, POLYGON_BYTES, measure_walk, walk_lines
 
-NONE = "\N{EN DASH}"
-FRAMES = 9_000
 SCREEN = Screen(1280, 1024, 60.0)
 PLANT_TRIANGLES = 100_000
 # View cells of the plant: cubes of 2 m about free places, in eight each of which is a view cell.
@@ -57,21 +56,6 @@ EYES, DIRECTIONS = 5, 100_000
 VIEWS = 5
 # Clusters by direction that vLOD's numbers are measured with.
 CLUSTERS = 26
-
-
-@dataclass(frozen=True)
-class Line:
-    """One published number and ours; a dash where we cannot measure."""
-
-    what: str
-    published: str
-    ours: str = NONE
-    note: str = ""
-
-
-def mean_max(values: np.ndarray) -> str:
-    """Mean and maximum."""
-    return f"{values.mean():,.2f} / {values.max():,}"
 
 
 def megabytes(path: Path) -> float:
@@ -105,7 +89,7 @@ def berkeley(folder: Path) -> dict[str, list[Line]]:
         "Section 2.4: the display database": _database(scene, made, folder),
         "Table 2: cells": _cells(scene, made),
         "Section 3.3: precomputation": _precomputation(made),
-        f"Tables 3 and 4: a walk of {FRAMES:,} frames": _frames(scene, made),
+        **_walked(made, folder),
         "The sets of this office stored, beside vLOD's (2005, sections 6 and 7)": _storage(made),
     }
 
@@ -157,28 +141,10 @@ def _precomputation(made: Bake) -> list[Line]:
     ]
 
 
-def _frames(scene: Scene, made: Bake) -> list[Line]:
-    path, known = walk(made, FRAMES), (made.potential_objects, made.potential_cells)
-    model = eye_model(made.graph, scene.object_bounds(), made.grid_m, known)
-    # What compiling takes, or loading, is not the eye's.
-    launch_eye(model, walk(made, 1), SCREEN)
-    begin = time.perf_counter()
-    found = launch_eye(model, path, SCREEN)
-    compute = 1e3 * (time.perf_counter() - begin) / len(path)
-    finest = np.array([levels[0] for levels in _sizes(scene)])
-    objects, cells = np.diff(found.starts), np.diff(found.cell_starts)
-    frame = np.repeat(np.arange(len(path)), objects)
-    polygons = np.bincount(frame, finest[found.objects], len(path)).astype(int)
-    share, note = 100 * polygons / finest.sum(), "all frames at once, one thread"
-    return [
-        Line("cells, visibility", "19 / 70", mean_max(cells)),
-        Line("objects rendered, visibility", "105 / 469", mean_max(objects)),
-        Line("polygons rendered, visibility", "5,002 / 45,828", mean_max(polygons)),
-        Line("of the model", "0.35 % / 3.23 %", f"{share.mean():.2f} % / {share.max():.2f} %"),
-        Line("compute time per frame, visibility", "18 ms / 107 ms", f"{compute:.3f} ms", note),
-        Line("polygons rendered, detail elision", "2,534 / 6,912", NONE, "needs the frame time of a graphics card"),
-        Line("swap times, resident and read sets (Tables 5, 6)", "see there", NONE, "no memory management yet"),
-    ]
+def _walked(made: Bake, folder: Path) -> dict[str, list[Line]]:
+    """Tables 3 to 6: a walk through the flattened model, at the published size of a polygon."""
+    flat = read_walk(folder / "True.walk")
+    return walk_lines(measure_walk(flat, FRAMES, WalkSettings(policy=ALL, polygon_bytes=POLYGON_BYTES)))
 
 
 def vlod(folder: Path) -> dict[str, list[Line]]:

@@ -43,6 +43,9 @@ KERNELS = {
     "select": "solvers",
     "tour": "sets",
     "runs": "sets",
+    "eye": "frames",
+    "lookahead": "frames",
+    "reads": "frames",
     "projection_point": "solvers",
 }
 SIZES = {
@@ -60,6 +63,9 @@ SIZES = {
         "select": (100, 1_000, 10_000),
         "tour": (500, 2_000, 8_000),
         "runs": (500, 2_000, 8_000),
+        "eye": (100, 1_000, 10_000),
+        "lookahead": (10, 100, 1_000),
+        "reads": (10, 100, 1_000),
         "projection_point": (10, 100, 400),
     },
     "full": {
@@ -76,6 +82,9 @@ SIZES = {
         "select": (1_000, 10_000, 100_000),
         "tour": (2_000, 8_000, 20_000),
         "runs": (2_000, 8_000, 20_000),
+        "eye": (1_000, 10_000, 100_000),
+        "lookahead": (100, 1_000, 10_000),
+        "reads": (100, 1_000, 10_000),
         "projection_point": (100, 400, 1_000),
     },
 }

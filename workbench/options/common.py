@@ -1,6 +1,7 @@
 """What the options of several commands share: how arguments are read, how help is laid out, verbosity."""
 
 import argparse
+import contextlib
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
@@ -58,6 +59,20 @@ def number(text: str) -> float:
         return float(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"expected a number, found {text!r}") from None
+
+
+def measured(units: dict[str, float]) -> Callable[[str], float]:
+    """Reads a number with a unit, such as 16MB; the units' names in small letters, and what each is worth."""
+
+    def read(text: str) -> float:
+        small = text.strip().lower()
+        for unit in sorted(units, key=len, reverse=True):
+            if small.endswith(unit):
+                with contextlib.suppress(ValueError):
+                    return float(small[: len(small) - len(unit)]) * units[unit]
+        raise argparse.ArgumentTypeError(f"expected a number and {' or '.join(filter(None, units))}, found {text!r}")
+
+    return read
 
 
 def ids(text: str) -> list[int]:

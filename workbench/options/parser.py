@@ -9,14 +9,14 @@ from .bakes import add_bake, add_clean, add_tune
 from .checks import add_bench, add_check, add_verify
 from .common import Help, Parser, completed
 from .models import add_inspect, add_make
-from .views import add_curves, add_export, add_pack, add_report, add_view
+from .views import add_curves, add_export, add_pack, add_report, add_view, add_walk
 
 # Commands by what they are for.
 GROUPS = {
     "models": (add_make, add_inspect),
     "baking": (add_bake, add_tune, add_clean),
     "checking": (add_verify, add_check, add_bench),
-    "using a bake": (add_report, add_view, add_export, add_pack, add_curves),
+    "using a bake": (add_report, add_view, add_export, add_pack, add_walk, add_curves),
 }
 TEXT = "From-region visibility for buildings, with a proof on both sides."
 MORE = """\

@@ -2,7 +2,7 @@
 
 import argparse
 
-from .common import add_seed, command, ids, whole
+from .common import add_seed, command, ids, image_size, measured, number, whole
 
 
 def add_report(commands: argparse._SubParsersAction) -> None:
@@ -122,3 +122,74 @@ def add_pack(commands: argparse._SubParsersAction) -> None:
         action="store_true",
         help="write nothing: check every file of a display database, and whether its bake has changed since",
     )
+
+
+BYTES = {"kb": 1e3, "mb": 1e6, "gb": 1e9, "b": 1.0, "": 1.0}
+
+
+def add_walk(commands: argparse._SubParsersAction) -> None:
+    """`viewcell walk`."""
+    walk = command(
+        commands,
+        "walk",
+        "walk",
+        "Walk through a display database: what is seen, drawn, held in memory and read in every frame.",
+        [
+            "walk house.walk",
+            "walk house.walk --path tour.csv --cache 4MB --policy all --check 20",
+            "walk http://127.0.0.1:8000/house.walk --latency 40ms --bandwidth 25mbit",
+        ],
+        json=True,
+    )
+    walk.add_argument("walk", metavar="WALK", help="folder of viewcell pack, or its address on a web server")
+    walk.add_argument(
+        "--path", metavar="FILE", default="auto", help="a recorded path; auto, the default: to random rooms"
+    )
+    walk.add_argument("--frames", type=whole(1), default=1000, help="of the default path; 1000 by default")
+    add_seed(walk, "the default path")
+    walk.add_argument(
+        "--policy",
+        choices=["coarse-first", "as-published", "vlod", "mmr", "all"],
+        default="coarse-first",
+        help="what is held in memory; coarse-first by default, all compares them",
+    )
+    walk.add_argument("--target-ms", type=number, default=16.0, metavar="MS", help="time of a frame; 16 by default")
+    walk.add_argument(
+        "--levels", metavar="FILE", help="tune-lod.json of viewcell tune lod; the software renderer's costs by default"
+    )
+    walk.add_argument("--cache", type=measured(BYTES), default=16e6, metavar="SIZE", help="memory; 16MB by default")
+    walk.add_argument(
+        "--read", type=measured(BYTES), default=0.8e6, metavar="SIZE", help="most read in a frame; 0.8MB by default"
+    )
+    walk.add_argument(
+        "--latency",
+        type=measured({"ms": 1.0, "s": 1e3}),
+        default=0.0,
+        metavar="TIME",
+        help="before the first byte of each read; 0ms by default",
+    )
+    walk.add_argument(
+        "--bandwidth",
+        type=measured({"kbit": 1e-3, "mbit": 1.0, "gbit": 1e3}),
+        metavar="RATE",
+        help="such as 25mbit; by default what --read takes in a frame's time",
+    )
+    walk.add_argument("--timeout", type=number, default=10.0, metavar="S", help="of a server; 10 by default")
+    walk.add_argument("--speed", type=number, default=2.0, metavar="M_S", help="most of the user; 2 m/s by default")
+    walk.add_argument("--turn", type=number, default=180.0, metavar="DEG_S", help="likewise; 180 degrees/s by default")
+    walk.add_argument("--ahead", type=number, default=1.0, metavar="S", help="time looked ahead; 1 by default")
+    walk.add_argument("--image", type=image_size, default=(640, 480), metavar="WxH", help="640x480 by default")
+    walk.add_argument("--fov", type=number, default=60.0, metavar="DEG", help="vertical; 60 by default")
+    walk.add_argument(
+        "--polygon-bytes",
+        type=whole(1),
+        metavar="N",
+        help="what a triangle takes in your renderer's memory; as in the file by default. Nothing is read then",
+    )
+    walk.add_argument(
+        "--real-time", action="store_true", help="frames at their times, drawn, read by a thread, and measured"
+    )
+    walk.add_argument(
+        "--check", type=whole(0), default=0, metavar="N", help="compare so many frames with the truth; 0 by default"
+    )
+    walk.add_argument("-o", "--out", metavar="FOLDER", help="folder to write; WALK's name with .tour by default")

@@ -12,6 +12,7 @@ from ...data.errors import InputError
 from ...data.store.bake_folder import BakeFolder
 from ...data.store.graph_folder import numbers
 from ...data.store.view_cells import read_rows
+from ...data.store.walk_folder import WalkFolder
 
 COLUMNS = ("x", "y", "z", "yaw", "pitch", "t")
 # How somebody walks: eye above the floor [m], speed [m/s], and frames per second, as the papers'.
@@ -28,7 +29,7 @@ TURN_S = 0.4
 LEGS_MOST = 10_000
 
 
-def walk(bake: BakeFolder, frames: int, seed: int = 0) -> CameraPath:
+def walk(bake: BakeFolder | WalkFolder, frames: int, seed: int = 0, *, everywhere: bool = False) -> CameraPath:
     """A walk at constant speed to random places of the inhabitable cells, by the shortest way through the portals.
 
     In each cell the eye follows a cubic Bezier curve whose control points lie in the cell, so the curve does, and it
@@ -37,9 +38,10 @@ def walk(bake: BakeFolder, frames: int, seed: int = 0) -> CameraPath:
     passes: a bake knows nothing of such cells. Cells that touch count as joined in a bake without portals.
 
     Args:
-        bake: any bake.
+        bake: any bake, or a display database.
         frames: how many, >= 1; 10 a second.
         seed: of the places.
+        everywhere: keep frames in cells that nobody can stand in, too; they count as frames.
 
     Raises:
         InputError: no frame asked for, or no inhabitable cell.
@@ -60,12 +62,12 @@ def walk(bake: BakeFolder, frames: int, seed: int = 0) -> CameraPath:
         for inside, curve in maze.leg(cell, here, goal, there):
             curves.append(curve)
             cells.append(inside)
-            length += maze.inhabitable[inside] * np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()
+            length += (everywhere or maze.inhabitable[inside]) * np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()
         cell, here = goal, there
     points = np.concatenate([curve[:-1] for curve in curves] + [curves[-1][-1:]])
     owner = np.repeat(cells, CURVE_POINTS - 1)
     run = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    return _sampled(points, run, maze.inhabitable[owner], frames)
+    return _sampled(points, run, maze.inhabitable[owner] | everywhere, frames)
 
 
 def _sampled(points: np.ndarray, run: np.ndarray, stands: np.ndarray, frames: int) -> CameraPath:
@@ -91,7 +93,7 @@ def _sampled(points: np.ndarray, run: np.ndarray, stands: np.ndarray, frames: in
 class _Maze:
     """Cells, and what joins them [m]."""
 
-    def __init__(self, bake: BakeFolder) -> None:
+    def __init__(self, bake: BakeFolder | WalkFolder) -> None:
         graph = bake.graph
         self.cells = graph.cells * bake.grid_m
         self.inhabitable = graph.inhabitable

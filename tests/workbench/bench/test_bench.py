@@ -37,6 +37,9 @@ SMALL = {
     "select": (20, 40),
     "tour": (60,),
     "runs": (60,),
+    "eye": (4,),
+    "lookahead": (4,),
+    "reads": (4,),
     "projection_point": (4,),
 }
 
@@ -131,7 +134,7 @@ def test_every_kernel_is_judged_and_none_hides_what_is_seen(small):
     assert [*dict.fromkeys(row.kernel for row in result.rows)] == [*KERNELS]
     assert result.wrong_hidden == 0 and all(not row.wrong_visible for row in result.rows)
     assert {row.kernel for row in result.rows if row.wrong_hidden is not None} == {
-        "stab", "flood", "target", "shadow", "coverage", "backface", "shaft", "raster"
+        "stab", "flood", "target", "shadow", "coverage", "backface", "shaft", "raster", "eye"
     }  # fmt: skip
     assert max(map(len, result.text().splitlines())) <= 160
 
