@@ -84,7 +84,7 @@ def lookahead_cases(n: int, device: Device) -> list[Case]:
         Case(
             kernel="lookahead",
             scene=f"rooms, reach {REACH_M:g} m ({min(n, LOOPED)} eyes)",
-            method="Dijkstra by SciPy",
+            method="Dijkstra",
             n=n,
             work=lambda: [ways.near(eye, holding(graph, eye), REACH_M) for eye in path.eyes],
             judge=partial(judge_reached, graph, path),
