@@ -197,6 +197,7 @@ def survives(made, tmp_path, moments):
     return killed
 
 
+@pytest.mark.slow
 def test_a_killed_pack_leaves_nothing_broken(made, tmp_path):
     assert survives(made, tmp_path, [0.0, 0.05, 0.3, 0.6]) >= 1
 
