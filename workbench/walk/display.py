@@ -11,7 +11,7 @@ import numpy as np
 from ...data.camera import CameraPath, Screen
 from ...data.errors import InputError
 from ...data.graph import CellGraph
-from ...data.ragged import owners_of, starts_of
+from ...data.ragged import owners_of, starts_of, take_lists
 from ...data.store.walk_folder import WalkFolder
 from ...kernels.eye import EyeAnswers, eye_model, launch_eye
 from ...kernels.launch import CPU
@@ -190,9 +190,7 @@ class Display:
 
     def limits(self, eye: np.ndarray, objects: np.ndarray) -> np.ndarray:
         """The coarsest level of each object that is good enough for an eye [m], int64."""
-        own = np.diff(self._starts)[objects]
-        places = np.repeat(self._starts[objects], own) + _within_runs(own)
-        starts = np.append(0, np.cumsum(own))
+        starts, places = take_lists(self._starts, objects)
         rows = np.column_stack([np.zeros(len(objects), np.int64), np.arange(len(objects))])
         limit = PixelLimit(PIXELS, self.screen)
         cell = np.stack([eye, eye])[None]
@@ -214,11 +212,6 @@ class Display:
         enough = np.where((lod != NOTHING) & (lod <= np.repeat(limits[problem.sightings], sizes)), rank, 0)
         first = np.maximum.reduceat(enough, problem.starts[:-1])
         return problem.only(rank >= np.repeat(first, sizes))
-
-
-def _within_runs(sizes: np.ndarray) -> np.ndarray:
-    """0, 1, ... of each run."""
-    return np.arange(int(sizes.sum())) - np.repeat(np.cumsum(sizes) - sizes, sizes)
 
 
 def check_path(walk: WalkFolder, path: CameraPath, holders: tuple[np.ndarray, np.ndarray]) -> None:

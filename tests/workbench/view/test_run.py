@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 import viewcell
@@ -98,7 +99,7 @@ def test_a_failure_leaves_the_view_that_was_there(walk, tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(run.shutil, "copyfile", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(InputError, match="No space left"):
         run.view(walk.folder, out, overwrite=True)
     assert {file.name: file.read_bytes() for file in out.iterdir()} == before

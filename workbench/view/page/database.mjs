@@ -30,6 +30,7 @@ export class Database {
     this.shapes = new Map();
     this.boxes = new Map();
     this.held = new Map();
+    this.reach = new Map();
     this.around = [];
     this.itemBoxes = [];
     this.triangleCounts = Array.from({ length: this.objects }, (_, id) => this.itemFaces[this.finestOf(id)]);
@@ -65,6 +66,15 @@ export class Database {
     const row = this.rowOfCell.get(cell);
     if (row === undefined || !this.head.claimsCells) return null;
     return decode(this.reached, this.reachedStarts[row], this.reachedStarts[row + 1], this.maze.count);
+  }
+
+  /** The same as a set, which is made once. */
+  reachOf(cell) {
+    if (!this.reach.has(cell)) {
+      const cells = this.cellsOf(cell);
+      this.reach.set(cell, cells && new Set(cells));
+    }
+    return this.reach.get(cell);
   }
 
   /** Corners and faces of an item: 3 numbers a vertex, 3 a face. */
@@ -118,9 +128,7 @@ export class Database {
 
   /** Least and most of an object's corners. */
   boxOf(id) {
-    if (!this.boxes.has(id)) {
-      this.boxes.set(id, boxAround(this.trianglesOf(id)));
-    }
+    if (!this.boxes.has(id)) this.boxes.set(id, boxAround(this.trianglesOf(id)));
     return this.boxes.get(id);
   }
 

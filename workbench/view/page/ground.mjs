@@ -1,9 +1,8 @@
 // What one stands on.
 
-/** Height of eyes above it, of the highest step one takes, and how far one can fall [m]. */
+/** Height of eyes above it, and of the highest step one takes [m]. */
 export const EYE = 1.65;
 export const STEP = 0.55;
-export const DEEP = 60;
 
 /** Height of the highest of some objects' triangles under a point, at most STEP above the feet; -Infinity for none.
  *

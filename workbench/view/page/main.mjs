@@ -53,8 +53,8 @@ class Viewer {
 
   /** Height at which the visitor's storey is cut open: a little below their cell's ceiling. */
   storeyTop() {
-    const { cell, database, point } = { ...this.visitor, database: this.database };
-    return cell < 0 ? this.stage.bounds[5] + 0.1 : Math.max(point[2] + 0.1, database.cellBoxes[6 * cell + 5] - 0.35);
+    const { cell, point } = this.visitor;
+    return cell < 0 ? this.stage.bounds[5] + 0.1 : Math.max(point[2] + 0.1, this.database.cellBoxes[6 * cell + 5] - 0.35);
   }
 
   pressed(code) {
@@ -80,10 +80,9 @@ class Viewer {
   /** What the eye sees of its cell's set, as an array of 0 and 1; or all of the set where that cannot be told. */
   sight(shown) {
     const { database, visitor, stage } = this;
-    const cells = database.cellsOf(visitor.cell);
     const found = database.maze.axes.length
       ? eyeSees(database.maze, visitor.point, stage.planes(), (id) => database.aroundOf(id),
-        (cell) => database.objectsIn(cell), shown, cells && new Set(cells))
+        (cell) => database.objectsIn(cell), shown, database.reachOf(visitor.cell))
       : null;
     if (!found) return shown;
     const out = new Uint8Array(database.objects);
@@ -110,11 +109,10 @@ class Viewer {
     const verdicts = new Array(database.objects).fill("hidden");
     for (const id of potential) verdicts[id] = !set || set.unknown.has(id) ? "unknown" : "seen";
     stage.show(shown, chosen.verdicts ? verdicts : null);
-    const cells = chosen.outlines ? (database.cellsOf(visitor.cell) ?? []) : [];
-    const near = new Set(cells);
+    const near = (chosen.outlines && database.reachOf(visitor.cell)) || new Set();
     const { sides, axes } = database.maze;
     const portals = Array.from(axes, (_, k) => k).filter((k) => near.has(sides[2 * k]) && near.has(sides[2 * k + 1]));
-    stage.outline(visitor.cell, cells, portals);
+    stage.outline(visitor.cell, [...near], portals);
     this.tell(chosen.mode === "whole" ? null : potential);
     this.cell = visitor.cell;
   }

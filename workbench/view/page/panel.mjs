@@ -4,7 +4,6 @@ export class Panel {
   /** Fill the page's fields; `chosen` hears of what is changed. */
   constructor(rooms, storeys, chosen) {
     this.fields = Object.fromEntries(["cell", "drawn", "triangles", "rate", "note"].map((id) => [id, document.getElementById(id)]));
-    this.rooms = rooms;
     const list = document.getElementById("rooms");
     list.replaceChildren(...rooms.map(({ name }) => Object.assign(document.createElement("option"), { value: name })));
     const room = document.getElementById("room");

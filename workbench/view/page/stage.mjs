@@ -20,7 +20,6 @@ export class Stage {
     this.canvas = canvas;
     this.renderer = new WebGLRenderer({ canvas, antialias: true });
     this.renderer.autoClear = false;
-    this.renderer.info.autoReset = false;
     this.renderer.localClippingEnabled = true;
     this.scene = new Scene();
     this.bounds = database.head.bounds;
@@ -111,24 +110,24 @@ export class Stage {
     this.cut.constant = height;
     this.aim(visitor, view);
     head.position.copy(eye.position);
+    if (view !== "above") this.lines.frustum.set(this.frustum());
     const { turn, rise, away } = this.orbit;
     const middle = view === "both" ? visitor.point : [0, 1, 2].map((k) => (this.bounds[k] + this.bounds[k + 3]) / 2);
     const far = view === "both" ? Math.min(away, 32) * (away / (1.15 * this.size())) : away;
     sky.position.set(middle[0] + far * Math.cos(rise) * Math.cos(turn), middle[1] + far * Math.cos(rise) * Math.sin(turn), middle[2] + far * Math.sin(rise));
     sky.lookAt(...middle);
-    renderer.info.reset();
     renderer.setScissorTest(false);
     renderer.clear();
     const half = Math.floor(width / 2);
     if (view !== "above") this.part(eye, 0, view === "both" ? half : width, depth);
-    if (view !== "inside") this.part(sky, view === "both" ? half : 0, view === "both" ? width - half : width, depth);
+    const [left, rest] = view === "both" ? [half, width - half] : [0, width];
+    sky.aspect = rest / depth;
+    sky.updateProjectionMatrix();
+    if (view !== "inside") this.part(sky, left, rest, depth);
   }
 
   part(camera, left, width, depth) {
     const { renderer } = this;
-    camera.aspect = width / depth;
-    camera.updateProjectionMatrix();
-    if (camera === this.eye) this.lines.frustum.set(this.frustum());
     renderer.setViewport(left, 0, width, depth);
     renderer.setScissor(left, 0, width, depth);
     renderer.setScissorTest(true);
