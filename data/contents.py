@@ -49,6 +49,8 @@ def cells_holding(graph: CellGraph, points: np.ndarray) -> tuple[np.ndarray, np.
     """
     point, cell = _holding(graph.cells, points)
     tiles = (cell < graph.tile_count) if graph.portal_count else np.zeros(len(cell), bool)
+    if tiles.all():
+        return starts_of(np.bincount(point, minlength=len(points))), cell.astype(np.int32)
     inside = np.zeros(len(points), bool)
     inside[point[tiles]] = True
     others = np.flatnonzero(~tiles & ~inside[point] & graph.inhabitable[cell])

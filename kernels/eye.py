@@ -337,6 +337,12 @@ def _lists(words: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Starts and numbers of the bits that are set in each row."""
     sizes, numbers = [np.zeros(0, np.int64)], [np.zeros(0, np.int32)]
     for part in words:
+        if len(part) == 1:
+            # Of one eye all bits together, in fewer calls.
+            own = np.flatnonzero(np.unpackbits(part.astype("<i4").view(np.uint8), bitorder="little"))
+            sizes.append(np.array([len(own)]))
+            numbers.append(own.astype(np.int32))
+            continue
         row, word = np.nonzero(part)
         bits = np.unpackbits(part[row, word].astype("<i4").view(np.uint8).reshape(-1, 4), axis=1, bitorder="little")
         place, bit = np.nonzero(bits)

@@ -38,7 +38,7 @@ class Now:
         seconds: after which, at the earliest, shape as rows.
         shown: objects that the eye may see, int64.
         wanted: item of the level that each is to be drawn at, shape as shown.
-        worth: pixels that each covers, about, shape as shown.
+        urgent: items of what is shown, the first to be read first, of `Stock.urgent`.
     """
 
     eye: np.ndarray
@@ -49,7 +49,7 @@ class Now:
     seconds: np.ndarray
     shown: np.ndarray
     wanted: np.ndarray
-    worth: np.ndarray
+    urgent: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -78,35 +78,54 @@ class Stock:
     motion: Motion
     capacity: int
 
-    def item_times(self, now: Now, rows: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Items of rows, ascending, and the time before which each cannot be in view [s].
+    def reached(self, rows: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Items of rows, ascending, and the time before which the eye cannot be where each may be seen from [s].
 
         Args:
-            now: the frame.
             rows: of the sets, shape (n,), int.
             seconds: before which the eye cannot be there, ascending, shape (n,).
         """
-        starts, items, owners = self.sets.starts, self.sets.items, self.shelves.owners
+        starts, items = self.sets.starts, self.sets.items
         soonest = np.full(len(self.shelves.sizes), np.inf)
         # The nearest last: the soonest stays.
         for row, time in zip(rows[::-1].tolist(), seconds[::-1].tolist(), strict=True):
             soonest[items[starts[row] : starts[row + 1]]] = time
         found = np.flatnonzero(soonest < np.inf)
-        own = owners[found]
+        return found, soonest[found]
+
+    def by_time(self, now: Now, items: np.ndarray, seconds: np.ndarray) -> np.ndarray:
+        """Items by level from the coarsest, and in a level by the time before which each cannot be in view.
+
+        Args:
+            now: the frame.
+            items: ascending, fewer than 2^23, with fewer than 2^15 levels, shape (n,), int64.
+            seconds: of `reached`, shape (n,).
+        """
+        own = self.shelves.owners.take(items)
         listed = np.zeros(len(self.balls.radii), bool)
         listed[own[own >= 0]] = True
         ids, turning = np.flatnonzero(listed), np.zeros(len(listed) + 1)
         turning[ids] = turn_seconds(self.balls.take(ids), now.eye, now.forward, self.half_angle, self.motion)
-        # What objects share is in place -1, at 0.
-        return found, np.maximum(soonest[found], turning[own])
+        # What objects share is in place -1, at 0. Whole microseconds, and of equals the first: integers without equals
+        # are sorted in a fifth of the time, and in the same way everywhere.
+        micros = (1e6 * np.maximum(seconds, turning.take(own))).astype(np.int64)
+        bits = len(items).bit_length()
+        order = np.sort((micros << bits) | np.arange(len(items))) & ((1 << bits) - 1)
+        steps = self.shelves.steps.take(items).take(order)
+        return items.take(order.take(np.argsort(steps.astype(np.int16), kind="stable")))
 
-    def shown_items(self, now: Now) -> np.ndarray:
-        """What the frame shows: coarsest and wanted levels of all objects, those with the most pixels a byte first.
+    def urgent(self, shown: np.ndarray, wanted: np.ndarray, worth: np.ndarray) -> np.ndarray:
+        """What a frame shows: coarsest and wanted levels of all objects, those with the most pixels a byte first.
 
         An object's coarsest level is the smaller one and comes no later.
+
+        Args:
+            shown: as of `Now`.
+            wanted: likewise.
+            worth: pixels that each covers, about, shape as shown.
         """
-        items = np.concatenate([self.shelves.coarsest[now.shown], now.wanted])
-        worth = np.concatenate([now.worth, now.worth])
+        items = np.concatenate([self.shelves.coarsest[shown], wanted])
+        worth = np.concatenate([worth, worth])
         return first_of_each(items[np.argsort(-worth / np.maximum(self.shelves.sizes[items], 1), kind="stable")])
 
     def cut(self, items: np.ndarray, most: float) -> np.ndarray:
@@ -116,7 +135,11 @@ class Stock:
 
 def first_of_each(items: np.ndarray) -> np.ndarray:
     """Each item once, where it first stands."""
-    return items[np.sort(np.unique(items, return_index=True)[1])]
+    at = np.arange(len(items))
+    place = np.empty(items.max(initial=-1) + 1, np.int64)
+    # The first last: it stays.
+    place[items[::-1]] = at[::-1]
+    return items[place[items] == at]
 
 
 class Policy:
@@ -137,8 +160,13 @@ class Policy:
         """Nothing was seen yet."""
         self.stock = stock
 
-    def ahead(self, now: Now) -> np.ndarray:
-        """Items to look ahead to, each once, the most wanted first, int64."""
+    def ahead(self, now: Now, held: np.ndarray) -> np.ndarray:
+        """Items to look ahead to, each once, the most wanted first, int64.
+
+        Args:
+            now: the frame.
+            held: whether each item is there or asked for, shape (items,), bool: among those the order is free.
+        """
         raise NotImplementedError
 
 
@@ -150,7 +178,7 @@ class AsPublished(Policy):
 
     name, bounded = "as-published", False
 
-    def ahead(self, now: Now) -> np.ndarray:
+    def ahead(self, now: Now, held: np.ndarray) -> np.ndarray:
         """By level from the coarsest, then by time."""
         stock, steps = self.stock, self.stock.shelves.steps
         claimed, left = np.zeros(len(steps), bool), stock.capacity
@@ -163,11 +191,9 @@ class AsPublished(Policy):
             claimed[fresh] = True
             left -= int(stock.shelves.sizes[fresh].sum())
             count += 1
-        found, times = stock.item_times(now, now.rows[:count], now.seconds[:count])
-        shown = stock.shown_items(now)
-        items = np.concatenate([shown, found])
-        times = np.concatenate([np.zeros(len(shown)), times])
-        return first_of_each(items[np.lexsort((times, steps[items]))])
+        found, seconds = stock.reached(now.rows[:count], now.seconds[:count])
+        items = np.concatenate([now.urgent, stock.by_time(now, found, seconds)])
+        return first_of_each(items[np.argsort(steps[items], kind="stable")])
 
 
 class CoarseFirst(Policy):
@@ -178,16 +204,23 @@ class CoarseFirst(Policy):
 
     name = "coarse-first"
 
-    def ahead(self, now: Now) -> np.ndarray:
+    def ahead(self, now: Now, held: np.ndarray) -> np.ndarray:
         """By level from the coarsest, then by time."""
-        stock, steps = self.stock, self.stock.shelves.steps
-        found, times = stock.item_times(now, now.rows, now.seconds)
-        shown = stock.shown_items(now)
-        now_shown = np.zeros(len(steps), bool)
-        now_shown[shown] = True
-        late = ~now_shown[found]
-        later = found[late][np.lexsort((times[late], steps[found[late]]))]
-        return stock.cut(np.concatenate([shown, later]), SHARE * stock.capacity)
+        stock, sizes, most = self.stock, self.stock.shelves.sizes, SHARE * self.stock.capacity
+        found, seconds = stock.reached(now.rows, now.seconds)
+        shown = np.zeros(len(sizes), bool)
+        shown[now.urgent] = True
+        late = ~shown[found]
+        found, seconds = found[late], seconds[late]
+        steps = stock.shelves.steps[found]
+        ends = sizes[now.urgent].sum() + np.cumsum(np.bincount(steps, sizes[found]))
+        # Levels that fit whole: of those only what is to be read needs an order.
+        whole = int(np.searchsorted(ends, most, "right"))
+        free = (steps < whole) & held[found]
+        moving = (steps <= whole) & ~free
+        ordered = stock.by_time(now, found[moving], seconds[moving])
+        first = stock.cut(np.concatenate([now.urgent, ordered]), most - sizes[found[free]].sum())
+        return np.concatenate([first, found[free]])
 
 
 class Neighbours(Policy):
@@ -202,7 +235,7 @@ class Neighbours(Policy):
         self._beside = [_beside(stock, adjacency, int(cell)) for cell in stock.cells]
         self._rows, self._items = None, np.zeros(0, np.int64)
 
-    def ahead(self, now: Now) -> np.ndarray:
+    def ahead(self, now: Now, held: np.ndarray) -> np.ndarray:
         """As they were when the eye entered its cell."""
         key = tuple(now.holders.tolist())
         if key and key != self._rows:
@@ -227,7 +260,7 @@ class AlongThePath(Policy):
         self._key: tuple | None = None
         self._forward, self._items = np.zeros(3), np.zeros(0, np.int64)
 
-    def ahead(self, now: Now) -> np.ndarray:
+    def ahead(self, now: Now, held: np.ndarray) -> np.ndarray:
         """The queue; a new one in a new cell, and where the view has turned by 30 degrees since the last frame."""
         key = tuple(now.holders.tolist()), bool(np.linalg.norm(now.velocity) >= SLOW)
         turned = float(now.forward @ self._forward) < np.cos(np.radians(TURNED_DEG))

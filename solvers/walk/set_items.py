@@ -114,26 +114,28 @@ class Motion:
 
 @dataclass(frozen=True)
 class Balls:
-    """Balls around boxes.
+    """Balls around boxes; an axis in each row, as sums over axes take a third of the time so.
 
     Attributes:
-        boxes: [m], shape (n, 2, 3), float64.
-        middles: [m], shape (n, 3).
+        middles: [m], shape (3, n), float64.
+        halves: half the size of each box [m], shape (3, n).
         radii: [m], shape (n,).
     """
 
-    boxes: np.ndarray
     middles: np.ndarray
+    halves: np.ndarray
     radii: np.ndarray
 
     @classmethod
     def around(cls, boxes: np.ndarray) -> "Balls":
-        """The smallest."""
-        return cls(boxes, boxes.mean(axis=1), np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) / 2)
+        """The smallest around boxes [m], shape (n, 2, 3), float64."""
+        halves = (boxes[:, 1] - boxes[:, 0]).T / 2
+        middles = np.ascontiguousarray(boxes.mean(axis=1).T)
+        return cls(middles, np.ascontiguousarray(halves), np.linalg.norm(halves, axis=0))
 
     def take(self, ids: np.ndarray) -> "Balls":
         """Some of them."""
-        return Balls(self.boxes[ids], self.middles[ids], self.radii[ids])
+        return Balls(self.middles.take(ids, axis=1), self.halves.take(ids, axis=1), self.radii.take(ids))
 
 
 def turn_seconds(balls: Balls, eye: np.ndarray, forward: np.ndarray, half_angle: float, motion: Motion) -> np.ndarray:
@@ -153,13 +155,13 @@ def turn_seconds(balls: Balls, eye: np.ndarray, forward: np.ndarray, half_angle:
     Returns:
         [s], shape (n,), float64; 0 for what may be in view.
     """
-    middle = balls.middles - eye
-    away = np.sqrt(np.einsum("ni,ni->n", middle, middle))
+    middle = balls.middles - eye[:, None]
+    away = np.sqrt((middle * middle).sum(axis=0))
     far = np.maximum(away, 1e-9)
-    angle = np.arccos(np.clip(middle @ forward / far, -1, 1))
+    angle = np.arccos(np.clip(forward @ middle / far, -1, 1))
     angle -= np.arcsin(np.minimum(balls.radii / far, 1.0))
     angle = np.where(away <= balls.radii, 0.0, np.maximum(angle - half_angle, 0.0))
-    apart = np.maximum(np.maximum(balls.boxes[:, 0] - eye, eye - balls.boxes[:, 1]), 0)
-    distance = np.maximum(np.sqrt(np.einsum("ni,ni->n", apart, apart)), 1e-9)
+    apart = np.maximum(np.abs(middle) - balls.halves, 0)
+    distance = np.maximum(np.sqrt((apart * apart).sum(axis=0)), 1e-9)
     turning = angle / (np.radians(motion.turn_deg) + np.pi * motion.speed / (2 * distance))
     return np.minimum(turning, distance / motion.speed)

@@ -65,13 +65,14 @@ def policy_bytes(
         gap: bytes read over rather than begun anew behind.
         lot: bytes asked for at a time.
     """
-    items, table, sizes = policy.ahead(now), policy.stock.shelves.table[now.shown], layout.sizes
+    table, sizes = policy.stock.shelves.table[now.shown], layout.sizes
+    items = policy.ahead(now, np.zeros(len(sizes), bool))
     spent = np.cumsum(sizes[items])
     asked = np.full(len(sizes), np.inf)
     asked[items] = spent
-    read, total, shown = np.full(len(sizes), np.inf), 0, policy.stock.shown_items(now)
+    read, total = np.full(len(sizes), np.inf), 0
     for chunk in np.split(items, np.flatnonzero(np.diff(spent // lot)) + 1):
-        for one in urgent_first(chunk, shown, layout, gap):
+        for one in urgent_first(chunk, now.urgent, layout, gap):
             total += one.size
             read[list(one.items)] = total
     # An object is there with the level that it is to be drawn at, or with a finer one.

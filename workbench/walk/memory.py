@@ -7,7 +7,7 @@ import numpy as np
 
 from ...data.store.ranges import Range, items_in, ranges_of
 from ...solvers.levels.benefit import NOTHING
-from ...solvers.walk.cache import RESIDENT, Cache
+from ...solvers.walk.cache import ABSENT, RESIDENT, Cache
 from ...solvers.walk.policies import Now, Policy
 from .reader import Line, Reader
 
@@ -136,7 +136,7 @@ class Memory:
         for wanted in self._reader.withdraw():
             self._forget(wanted.items)
             self._in_flight -= wanted.size
-        ahead = self.policy.ahead(now)
+        ahead = self.policy.ahead(now, self._states() != ABSENT)
         read, left = [], 0 if self.given_up else self._read_bytes - self._in_flight
         for group, cache in enumerate(self.caches):
             change = cache.change(number, ahead[self._group[ahead] == group], left)
@@ -144,7 +144,7 @@ class Memory:
             read.append(change.read)
             self._going += change.released.tolist()
         asked = np.concatenate(read)
-        ranges = urgent_first(asked, self.policy.stock.shown_items(now), self._layout, self._gap)
+        ranges = urgent_first(asked, now.urgent, self._layout, self._gap)
         self._in_flight += sum(wanted.size for wanted in ranges)
         self._reader.ask(ranges, clock_s)
         short = (drawn >= 0) & (drawn != lods)
@@ -158,10 +158,13 @@ class Memory:
     @property
     def resident(self) -> np.ndarray:
         """Whether each item is there, bool."""
-        out = np.zeros(len(self._group), bool)
-        for group, cache in enumerate(self.caches):
-            out |= (cache.state == RESIDENT) & (self._group == group)
-        return out
+        return self._states() == RESIDENT
+
+    def _states(self) -> np.ndarray:
+        """Of each item, in its own cache."""
+        if len(self.caches) == 1:
+            return self.caches[0].state
+        return np.choose(self._group, [cache.state for cache in self.caches])
 
     def drawn(self, objects: np.ndarray, lods: np.ndarray) -> np.ndarray:
         """The level of each object that is there and nearest to what is wanted: coarser ones first, then finer ones."""

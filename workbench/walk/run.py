@@ -265,7 +265,8 @@ class _Tour:
         rows, own = self._row_of[cells], self._row_of[holders]
         known = rows >= 0
         level = np.where(shown.lods == NOTHING, shelves.counts[shown.objects] - 1, shown.lods)
+        wanted = shelves.table[shown.objects, level]
         return Now(
             path.eyes[frame], self._forward[frame], self._velocity[frame], own[own >= 0], rows[known],
-            length[known] / motion.speed, shown.objects, shelves.table[shown.objects, level], shown.pixels,
+            length[known] / motion.speed, shown.objects, wanted, self.stock.urgent(shown.objects, wanted, shown.pixels),
         )  # fmt: skip

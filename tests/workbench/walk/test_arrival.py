@@ -11,21 +11,22 @@ SIZES = np.array([100, 50, 10, 400])
 class Fixed:
     """A policy that wants items in one order; object k has the levels 2 k (fine) and 2 k + 1 (coarse)."""
 
-    def __init__(self, items, shown=()):
-        self.items, self._shown = np.array(items), np.array(shown, int)
+    def __init__(self, items):
+        self.items = np.array(items)
         self.stock = self
         self.shelves = self
         self.table = np.array([[0, 1], [3, 2]])
 
-    def ahead(self, now):
+    def ahead(self, now, held):
         return self.items
-
-    def shown_items(self, now):
-        return self._shown
 
 
 class Eye:
-    shown, wanted = np.array([0, 1]), np.array([0, 2])
+    shown, wanted, urgent = np.array([0, 1]), np.array([0, 2]), np.zeros(0, int)
+
+
+class Hurried(Eye):
+    urgent = np.array([2])
 
 
 LAYOUT = Layout(np.array([0, 100, 150, 160]), SIZES, True)
@@ -63,7 +64,7 @@ def test_ranges_count_what_lies_between():
     # Items 0 and 2 in one range over item 1; apart if the gap is too large, or if one of them is shown now.
     assert policy_bytes(Fixed([0, 2]), Eye, pixels, LAYOUT, 50, 10**6)[1].tolist() == [160, 160]
     assert policy_bytes(Fixed([0, 2]), Eye, pixels, LAYOUT, 49, 10**6)[1].tolist() == [110, 110]
-    assert policy_bytes(Fixed([0, 2], [2]), Eye, np.array([0, 50]), LAYOUT, 50, 10**6)[1].tolist() == [10, 10]
+    assert policy_bytes(Fixed([0, 2]), Hurried, np.array([0, 50]), LAYOUT, 50, 10**6)[1].tolist() == [10, 10]
     assert policy_bytes(Fixed([0, 2]), Eye, np.array([0, 50]), LAYOUT, 50, 10**6)[1].tolist() == [160, 160]
 
 

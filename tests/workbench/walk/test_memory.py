@@ -32,13 +32,14 @@ class Reader:
 
 
 def memory(ahead, capacity=1000, most=1000, near_share=None):
-    stock = SimpleNamespace(shelves=SHELVES, capacity=capacity, shown_items=lambda now: np.zeros(0, int))
-    policy = SimpleNamespace(stock=stock, near_share=near_share, bounded=True, ahead=lambda now: np.array(ahead, int))
+    stock = SimpleNamespace(shelves=SHELVES, capacity=capacity)
+    wanted = np.array(ahead, int)
+    policy = SimpleNamespace(stock=stock, near_share=near_share, bounded=True, ahead=lambda now, held: wanted)
     layout = Layout(np.array([0, 100, 200, 300]), SHELVES.sizes, True)
     return Memory(policy, layout, Reader(), Line(1e6), most)
 
 
-NOW = SimpleNamespace(shown=np.array([0, 1]))
+NOW = SimpleNamespace(shown=np.array([0, 1]), urgent=np.zeros(0, int))
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,7 @@ def test_bytes_come_and_go_and_what_was_drawn_stays_until_the_next_frame():
     held._reader.done = [Arrival(wanted, b"a" * 100 + b"b" * 100, "", 0.5)]
     found = held.frame(1, NOW, none, 0.1)
     assert held.held == {0: b"a" * 100, 1: b"b" * 100} and found.swap_s == 0.5 and found.reads == 0
-    held.policy.ahead = lambda now: np.array([3, 0])
+    held.policy.ahead = lambda now, there: np.array([3, 0])
     found = held.frame(2, NOW, none, 0.2)
     assert found.read.tolist() == [3] and found.resident.tolist() == [0] and set(held.held) == {0, 1}
     held.frame(3, NOW, none, 0.3)
