@@ -1,8 +1,8 @@
-"""A plain z-buffer rasteriser: the object that each pixel shows, and the work done for it.
+"""A plain z-buffer rasteriser: the object that each pixel shows, how deep, and the work done for it.
 
-It is the renderer that costs of levels of detail are measured with where the user's own has not been. A pixel shows
-what the ray through its centre meets first. With corners a, b, c in camera coordinates, x and y multiplied by the focal
-length, that ray is (x, y, 1) and
+It is the renderer that costs of levels of detail are measured with where the user's own has not been, and that draws
+what textured depth meshes are made of. A pixel shows what the ray through its centre meets first. With corners a, b, c
+in camera coordinates, x and y multiplied by the focal length, that ray is (x, y, 1) and
 
     (x, y, 1) = (e_a a + e_b b + e_c c) / det(a, b, c),    e_a = (b x c) . (x, y, 1), ...
 
@@ -159,6 +159,7 @@ def _raster(
     slots: int,
     depths: wp.array[wp.float64],
     ids_out: wp.array2d[int],
+    inverse_out: wp.array2d[wp.float64],
     fragments_out: wp.array[wp.int64],
 ):
     lane = wp.vec2i(slots, wp.tid())
@@ -180,6 +181,10 @@ def _raster(
                 if a[2] >= near or b[2] >= near or c[2] >= near:
                     drawn = draw_triangle(cameras, a, b, c, rows, what[2], depths, lane, ids_out[frame])
                     fragments += wp.int64(drawn)
+        # An array without columns asks for no depths.
+        if inverse_out.shape[1] > 0:
+            for place in range((rows[1] - rows[0]) * cameras.width):
+                inverse_out[frame, rows[0] * cameras.width + place] = depths[place * lane[0] + lane[1]]
         fragments_out[item] = fragments
         item += slots
 
@@ -191,10 +196,13 @@ class Images:
     Attributes:
         ids: object that each pixel shows, -1 for none, top row first, shape (frames, height, width), int32.
         fragments: pixels of all triangles drawn, hidden ones included, shape (frames,), int64.
+        inverse_depths: of what each pixel shows [1 / grid steps], 0 for nothing, shape as ids, float64; None unless
+            asked for.
     """
 
     ids: np.ndarray
     fragments: np.ndarray
+    inverse_depths: np.ndarray | None = None
 
 
 def device_triangles(triangles: np.ndarray, device: Device = CPU) -> wp.array:
@@ -213,9 +221,10 @@ def launch_raster(
     height: int,
     focal: float,
     near: float,
+    depths: bool = False,
     device: Device = CPU,
 ) -> Images:
-    """The object that each pixel of each frame shows.
+    """The object that each pixel of each frame shows, and how deep it is.
 
     Args:
         triangles: of `device_triangles`, on the same device.
@@ -227,6 +236,7 @@ def launch_raster(
         height: [pixels].
         focal: [pixels], see `data.camera.Screen`.
         near: depth before which nothing is drawn [grid steps], > 0.
+        depths: whether to keep depths, too.
         device: where to. CPU threads share the frames, one frame is drawn by one thread; on a GPU a thread draws a row.
 
     Returns:
@@ -258,9 +268,8 @@ def launch_raster(
     bands = 1 if device.is_cpu else height
     ids = wp.full((frames, width * height), -1, dtype=int, device=device.name)
     fragments = device.zeros(frames * bands, wp.int64)
-    scratch = Scratch(width * -(-height // bands))
-    launch_slots(
-        _raster, frames * bands, [cameras, draws, triangles, bands], scratch, [ids, fragments], device, chunk=1
-    )
-    counted = fragments.numpy().reshape(frames, bands).sum(axis=1)
-    return Images(ids.numpy().reshape(frames, height, width), counted)
+    inverse = wp.zeros((frames, width * height if depths else 0), dtype=f64, device=device.name)
+    scratch, out = Scratch(width * -(-height // bands)), [ids, inverse, fragments]
+    launch_slots(_raster, frames * bands, [cameras, draws, triangles, bands], scratch, out, device, chunk=1)
+    counted, shape = fragments.numpy().reshape(frames, bands).sum(axis=1), (frames, height, width)
+    return Images(ids.numpy().reshape(shape), counted, inverse.numpy().reshape(shape) if depths else None)

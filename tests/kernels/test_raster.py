@@ -56,7 +56,8 @@ def test_pixels_show_what_exact_rays_meet_first(seed, device):
     eyes, axes = random_view(seed)
     triangles = random_triangles(rng)
     owners = rng.permutation(len(triangles))
-    shown = draw(triangles, owners, eyes, axes, screen, device).ids[0]
+    images = draw(triangles, owners, eyes, axes, screen, device, depths=True)
+    shown, inverse = images.ids[0], images.inverse_depths[0]
     certain = 0
     for row in range(screen.height):
         for column in range(screen.width):
@@ -65,7 +66,10 @@ def test_pixels_show_what_exact_rays_meet_first(seed, device):
             if (truth.clear is None or truth.clear > CLEAR**2) and (truth.lead is None or truth.lead > LEAD):
                 certain += 1
                 assert shown[row, column] == truth.owner, f"pixel {row}, {column}"
+                depth = 0.0 if truth.depth is None else 1 / float(truth.depth)
+                assert inverse[row, column] == pytest.approx(depth, rel=1e-9)
     assert certain == screen.width * screen.height
+    assert draw(triangles, owners, eyes, axes, screen, device).inverse_depths is None
 
 
 def test_triangles_that_share_an_edge_leave_no_pixel_between_them():
@@ -127,10 +131,12 @@ def test_frames_do_not_depend_on_threads_or_company():
     triangles = random_triangles(rng)
     views = [random_view(seed) for seed in range(5)]
     eyes, axes = (np.concatenate([view[k] for view in views]) for k in (0, 1))
-    together = draw(triangles, np.arange(len(triangles)), eyes, axes, screen, device=Device(threads=2))
+    together = draw(triangles, np.arange(len(triangles)), eyes, axes, screen, Device(threads=2), depths=True)
     for frame in range(5):
-        alone = draw(triangles, np.arange(len(triangles)), eyes[frame : frame + 1], axes[frame : frame + 1], screen)
+        own = slice(frame, frame + 1)
+        alone = draw(triangles, np.arange(len(triangles)), eyes[own], axes[own], screen, depths=True)
         assert np.array_equal(alone.ids[0], together.ids[frame])
+        assert np.array_equal(alone.inverse_depths[0], together.inverse_depths[frame])
         assert alone.fragments[0] == together.fragments[frame]
 
 

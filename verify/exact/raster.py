@@ -18,11 +18,13 @@ class Hit:
         clear: squared distance [pixels] from the ray to the nearest edge on the screen, of triangles that end within
             a pixel; None if there is none.
         lead: by how much the next owner's surface is farther away, as part of the depth; None if there is none.
+        depth: along the view, of what is met; None if nothing is.
     """
 
     owner: int
     clear: Fraction | None
     lead: Fraction | None
+    depth: Fraction | None = None
 
 
 def first_hit(
@@ -70,4 +72,4 @@ def first_hit(
         return Hit(-1, clear, None)
     order = sorted(nearest, key=lambda owner: nearest[owner])
     lead = nearest[order[1]] / nearest[order[0]] - 1 if len(order) > 1 else None
-    return Hit(order[0], clear, lead)
+    return Hit(order[0], clear, lead, nearest[order[0]])
