@@ -37,7 +37,8 @@ class Interval:
         return self + -other
 
     def __mul__(self, other: "Interval") -> "Interval":
-        with np.errstate(invalid="ignore"):
+        # What overflows is infinite on its own side, which holds it.
+        with np.errstate(invalid="ignore", over="ignore"):
             ends = [a * b for a in (self.low, self.high) for b in (other.low, other.high)]
         # Nothing times what grows for ever is nothing.
         ends = [np.where(np.isnan(end), 0.0, end) for end in ends]
@@ -47,7 +48,8 @@ class Interval:
         """Everything, where the divisor may be zero."""
         zero = (other.low <= 0) & (other.high >= 0)
         low, high = np.where(zero, 1.0, other.low), np.where(zero, 1.0, other.high)
-        inverse = _outwards(1.0 / high, 1.0 / low)
+        with np.errstate(over="ignore"):
+            inverse = _outwards(1.0 / high, 1.0 / low)
         whole = Interval(np.where(zero, -np.inf, inverse.low), np.where(zero, np.inf, inverse.high))
         return self * whole
 
