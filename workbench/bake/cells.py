@@ -1,4 +1,4 @@
-"""Where a bake looks from: cells and portals of a model, an octree, a table of boxes, or a bare graph."""
+"""Where a bake looks from: cells and portals of a model, an octree, walkways, a table of boxes, or a bare graph."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +21,7 @@ from ...data.store.scene_folder import scene_manifest
 from ...data.store.view_cells import read_view_cells
 from ...data.subdivide import cut_large, cut_rooms, merge, subdivide
 from ...data.view_cells import as_graph, octree_roots, walkable
+from ...data.walkways import walkway_cells
 from .halve import halved
 from .manifest import Clock
 from .settings import Settings
@@ -103,7 +104,7 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
     if not cells:
         cells = "octree" if method in ("occluders", "vlod") or (method == "auto" and large) else "portals"
     if cells == "portals" and method in ("occluders", "vlod"):
-        raise InputError(f"cells: expected octree or a table for the method {method}, found portals")
+        raise InputError(f"cells: expected octree, walkways or a table for the method {method}, found portals")
     if cells == "portals":
         graph, notes = build_graph(model, settings, clock)
         if settings.largest_cell:
@@ -137,6 +138,8 @@ def model_sources(model: PreparedModel, settings: Settings, clock: Clock) -> Sou
     if cells == "octree":
         roots = octree_roots(scene, settings.cell_size_m)
         graph, because = as_graph(roots[walkable(roots, model)]), "octree"
+    elif cells == "walkways":
+        graph, because = as_graph(walkway_cells(model)), "walkways"
     else:
         graph, because = read_view_cells(cells, scene), "given"
     if portal_graph is not None:

@@ -46,7 +46,9 @@ def check_place(out: Path, settings: Settings, overwrite: bool) -> None:
     """
     refuse_others(out, "bake")
     if settings.table is not None and not settings.table.is_file():
-        raise InputError(f"{settings.cells}: expected a table of view cells, portals or octree, found nothing there")
+        raise InputError(
+            f"{settings.cells}: expected a table of view cells, portals, octree or walkways, found nothing there"
+        )
     parent = out.absolute().parent
     while not parent.exists():
         parent = parent.parent

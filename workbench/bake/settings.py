@@ -58,8 +58,8 @@ class CellSettings:
     """Where one looks from.
 
     Attributes:
-        cells: view cells: "portals" for those of the cell-and-portal graph, "octree", or a table of boxes. By default
-            the method's own.
+        cells: view cells: "portals" for those of the cell-and-portal graph, "octree", "walkways" for small ones around
+            the eyes of all who walk, or a table of boxes. By default the method's own.
         threshold_m2: opaque area below which a plane does not cut cells; larger is faster and looser.
         cell_size_m: of the octree's roots.
         depth: times that a cell of the octree may be refined.
@@ -83,7 +83,7 @@ class CellSettings:
     @property
     def table(self) -> Path | None:
         """The table of boxes that `cells` names, if it names one."""
-        return None if self.cells in ("", "portals", "octree") else Path(self.cells)
+        return None if self.cells in ("", "portals", "octree", "walkways") else Path(self.cells)
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ def _uncovered_rooms(model: PreparedModel, graph: CellGraph, facts: dict) -> lis
     """Rooms that view cells do not cover, as the manifest has them under `rooms`; found now if it has none."""
     rooms = facts.get("rooms")
     # Whoever gives view cells knows where they are not.
-    if rooms is None and facts.get("inhabitable_because") not in ("given", "octree"):
+    if rooms is None and facts.get("inhabitable_because") not in ("given", "octree", "walkways"):
         rooms = [cover.entry for cover in room_covers(model.scene, graph, model.room_points)]
     return [room for room in rooms or [] if "why" in room]
 
@@ -108,6 +108,8 @@ def _first_to_do(facts: dict, budget: bool, leak: bool) -> str:
         return "the outside leaks in: first close that"
     if facts.get("inhabitable_because") == "given":
         return "smaller view cells keep less"
+    if facts.get("inhabitable_because") == "walkways":
+        return "such small cells keep little that no eye in them sees, if the model is not one open hall"
     if facts.get("inhabitable_because") == "octree":
         return "a smaller --cell-size or a larger --depth keeps less, if the model is not one open hall"
     return (

@@ -212,6 +212,7 @@ def test_a_bare_graph_keeps_no_objects(tmp_path):
         ({}, True, True, "first give it more"),
         ({}, False, True, "first close that"),
         ({"inhabitable_because": "octree"}, False, False, "--cell-size"),
+        ({"inhabitable_because": "walkways"}, False, False, "open hall"),
         ({"inhabitable_because": "inside the model's 3 rooms"}, False, False, "--yaw"),
     ],
 )
