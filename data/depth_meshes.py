@@ -11,6 +11,8 @@ import numpy as np
 FACES = np.array([[np.eye(3)[k - 2], np.eye(3)[k - 1], sign * np.eye(3)[k]] for k in range(3) for sign in (1, -1)])
 # Texels of each image that lie beyond its face on every side: the faces overlap, and leave no seam.
 RIM = 1
+# Heights of vertices are multiples of this [texels].
+PARALLAX_STEP = 2.0**-6
 # The layer of a texel that shows nothing.
 NOTHING = 255
 
@@ -21,7 +23,7 @@ class DepthMesh:
 
     Attributes:
         pixels: column and row of each vertex, top row first, shape (n, 2), uint16.
-        parallax: of each vertex [texels], shape (n,), float32.
+        parallax: of each vertex [texels], multiples of PARALLAX_STEP, shape (n,), float32.
         triangles: vertices of each, shape (m, 3), uint32; each holds a pixel that shows something, if only at a corner.
         error: no texel that shows something is drawn farther than this from its own parallax [texels], proved.
     """

@@ -66,18 +66,10 @@ class FarSides:
         Raises:
             InputError: a cull box that does not hold the ball around the cell.
         """
-        cell, half = np.asarray(cell, np.float64), cull_box / 2
-        middle, reach = cell.mean(axis=0), float(np.linalg.norm(cell[1] - cell[0]) / 2)
-        if not 0 < reach < half:
-            raise InputError(
-                f"cull box: expected a size above {2 * reach:,.0f} steps, which the ball around the cell has, "
-                f"found {cull_box:,.0f}"
-            )
-        eyes = EyeRange(reach, half, self._texels / 2 - RIM)
-        boxes = self._boxes[potential]
-        within = ((boxes[:, 0] <= middle + half) & (boxes[:, 1] >= middle - half)).all(axis=1)
-        beyond = potential[~within & ~self._glass[potential]]
-        images = self._draw(beyond, middle, half)
+        middle, reach = _ball(np.asarray(cell, np.float64), cull_box)
+        eyes = EyeRange(reach, cull_box / 2, self._texels / 2 - RIM)
+        beyond = self._beyond(potential, middle, cull_box / 2)
+        images = self._draw(beyond, middle, cull_box / 2)
         parallax, shown = eyes.parallax(images.inverse_depths), images.ids >= 0
         allowed, step = self._error / eyes.worst(1.0), SKIN / eyes.worst(1.0)
 
@@ -103,6 +95,21 @@ class FarSides:
             skin=eyes.worst(_longest_skin(parallax, np.stack(layers))),
         )
 
+    def geometry(self, potential: np.ndarray, cell: np.ndarray, cull_box: float) -> np.ndarray:
+        """Objects that `of` has in `near`, without making meshes; no others are so, and beyond, about a larger box.
+
+        Args and raises as there.
+        """
+        middle, _ = _ball(np.asarray(cell, np.float64), cull_box)
+        images = self._draw(self._beyond(potential, middle, cull_box / 2), middle, cull_box / 2)
+        return np.setdiff1d(potential, images.ids)
+
+    def _beyond(self, potential: np.ndarray, middle: np.ndarray, half: float) -> np.ndarray:
+        """Opaque objects that are wholly beyond the box."""
+        boxes = self._boxes[potential]
+        within = ((boxes[:, 0] <= middle + half) & (boxes[:, 1] >= middle - half)).all(axis=1)
+        return potential[~within & ~self._glass[potential]]
+
     def _draw(self, objects: np.ndarray, middle: np.ndarray, half: float) -> Images:
         """Six images of objects beyond the box; a face shows none that does not reach beyond its plane."""
         boxes, calls, starts = self._boxes[objects], [], [0]
@@ -125,6 +132,17 @@ class FarSides:
             depths=True,
             device=self._device,
         )
+
+
+def _ball(cell: np.ndarray, cull_box: float) -> tuple[np.ndarray, float]:
+    """Middle and radius of the ball around a cell, which a cull box must hold."""
+    middle, reach = cell.mean(axis=0), float(np.linalg.norm(cell[1] - cell[0]) / 2)
+    if not 0 < reach < cull_box / 2:
+        raise InputError(
+            f"cull box: expected a size above {2 * reach:,.0f} steps, which the ball around the cell has, "
+            f"found {cull_box:,.0f}"
+        )
+    return middle, reach
 
 
 def _longest_skin(parallax: np.ndarray, layers: np.ndarray) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from pydelatin import Delatin
 from scipy import ndimage
 
-from ...data.depth_meshes import DepthMesh
+from ...data.depth_meshes import PARALLAX_STEP, DepthMesh
 from ...data.errors import InputError
 from ...data.ragged import lots, owners_of, places_of, starts_of
 from .parallax import ROUNDING
@@ -33,8 +33,9 @@ def depth_mesh(parallax: np.ndarray, shown: np.ndarray, error: float) -> DepthMe
         error: texels that its parallax may be off by, > 0.
 
     Returns:
-        A mesh; its own `error` is what was found, at most some 1e-6 of the largest parallax above what was asked for.
-        Without triangles where nothing is shown.
+        A mesh; its own `error` is what was found, at most some 1e-6 of the largest parallax, or half a PARALLAX_STEP
+        if that is more than was asked for, above it. Vertices by rows; of each triangle the first one first, and
+        triangles by vertices. Without any where nothing is shown.
 
     Raises:
         InputError: a shape, size, value or error out of range.
@@ -50,18 +51,26 @@ def depth_mesh(parallax: np.ndarray, shown: np.ndarray, error: float) -> DepthMe
         return DepthMesh(*empty, 0.0)
     nearest = ndimage.distance_transform_edt(~shown, return_distances=False, return_indices=True)
     heights = parallax[tuple(nearest)].astype(np.float32)
-    found = Delatin(heights, max_error=error)
+    # Vertices are rounded as they are stored.
+    found = Delatin(heights, max_error=max(error - PARALLAX_STEP / 2, error / 2))
     # The library counts rows from below.
     column, row = found.vertices[:, 0].astype(np.int64), len(heights) - 1 - found.vertices[:, 1].astype(np.int64)
-    pixels, triangles = np.column_stack([column, row]), found.triangles.astype(np.int64)
-    kept, off = _measure(pixels, heights[row, column].astype(np.float64), triangles, parallax, shown)
+    order = np.lexsort((column, row))
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    pixels, triangles = np.column_stack([column, row])[order], place[found.triangles.astype(np.int64)]
+    drawn = np.round(heights[row, column][order].astype(np.float64) / PARALLAX_STEP) * PARALLAX_STEP
+    kept, off = _measure(pixels, drawn, triangles, parallax, shown)
     used, triangles = np.unique(triangles[kept], return_inverse=True)
-    return DepthMesh(
-        pixels[used].astype(np.uint16),
-        heights[row, column][used],
-        triangles.reshape(-1, 3).astype(np.uint32),
-        off,
-    )
+    return DepthMesh(pixels[used].astype(np.uint16), drawn[used].astype(np.float32), _in_order(triangles), off)
+
+
+def _in_order(triangles: np.ndarray) -> np.ndarray:
+    """Triangles, each turned until its first vertex is first, by vertices; shape (m, 3), uint32."""
+    triangles = triangles.reshape(-1, 3)
+    first = triangles.argmin(axis=1)[:, None]
+    turned = np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
+    return turned[np.lexsort(turned.T[::-1])].astype(np.uint32)
 
 
 def _measure(
