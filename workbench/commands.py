@@ -457,7 +457,7 @@ def pack(options: argparse.Namespace) -> int:
     if options.check:
         from ..data.store.walk_folder import read_walk
 
-        if options.out or options.flatten or options.overwrite:
+        if options.out or options.flatten or options.overwrite or options.depth_meshes:
             raise InputError("pack: expected nothing to write beside --check")
         walk = read_walk(options.bake)
         say(pack_text(walk))
@@ -465,13 +465,18 @@ def pack(options: argparse.Namespace) -> int:
             complain(stale)
         return FAILED if stale else 0
     from ..data.store.bake_folder import read_bake
+    from .pack.depth import DepthSettings
     from .pack.run import default_out
     from .pack.run import pack as write
 
+    told = {name: getattr(options, name) for name in ("triangles", "along") if getattr(options, name) is not None}
+    if told and not options.depth_meshes:
+        raise InputError(f"pack: expected --depth-meshes beside --{next(iter(told))}")
+    depth = DepthSettings(options.depth_meshes, **told) if options.depth_meshes else None
     made = read_bake(options.bake)
     out = Path(options.out) if options.out else default_out(made)
     before = _stamp(out)
-    walk = write(made, out, flatten=options.flatten, overwrite=options.overwrite)
+    walk = write(made, out, flatten=options.flatten, depth=depth, overwrite=options.overwrite)
     say(pack_text(walk))
     say(f"written to {out}" if _stamp(out) != before else f"{out} was up to date; --overwrite packs it again")
     return 0

@@ -3,7 +3,8 @@
 `manifest.json` says of which bake, and has a checksum of every other file. `objects.parquet` has a row for each object;
 its row number is its display id, by which sets are stored. `items.parquet` says where levels of detail lie in
 `geometry.bin`, and `cell_items.parquet` which of them do. `sets.parquet` has what may be visible from each view cell as
-runs (data/runs.py); `cells` in it are rows of `cells.parquet`. docs/reference/walk-folder.md has all columns.
+runs (data/runs.py); `cells` in it are rows of `cells.parquet`. `depth_meshes.parquet` has a row for each view cell with
+depth meshes, whose faces lie in `geometry.bin` after the items. docs/reference/walk-folder.md has all columns.
 """
 
 import hashlib
@@ -22,10 +23,12 @@ from ..graph import CellGraph
 from ..ragged import starts_of
 from ..runs import RunSets, decode
 from ..scene import Mesh
+from .depth_items import FaceItem, decode_face
 from .framed import FramedFolder
 from .graph_folder import read_graph
 from .scene_folder import new_folder, one_line, read_manifest, read_table
 from .scene_tables import BOX_COLUMNS, colours_of, list_rows
+from .walk_depth import DepthIndex
 from .walk_tables import SHORT, item_size
 
 __all__ = ["WalkFolder", "read_walk"]
@@ -40,6 +43,10 @@ COLUMNS = {
     "cell_items": ("cell_id", "limits"),
     "cells": ("cell_id", *BOX_COLUMNS, "inhabitable", "name"),
     "portals": ("portal_id", "cell_a", "cell_b", "axis", "coordinate", "min_u", "max_u", "min_v", "max_v"),
+    "depth_meshes": (
+        *("cell_id", "cull_box_m", "pixels", "near", "levels", "far", "middle", "reach_m", "texels", "error_texels"),
+        *("skin_texels", "offsets", "sizes", "faces"),
+    ),
 }
 # What is read before the first frame: all but the geometry.
 INDEX_FILES = tuple(f"{name}.parquet" for name in COLUMNS)
@@ -47,7 +54,7 @@ MANIFEST_KEYS = ("bake", "grid_m", "origin", "yaw_deg", "flattened", "counts", "
 # Tables of a bake that a pack is made of.
 SOURCES = ("meshes", "objects", "cells", "portals", "cell_to_cell", "cell_to_object", "cell_lods")
 # Sets take a third less in these encodings than in Parquet's own.
-BINARY = ("potential", "unknown", "cells", "limits")
+BINARY = ("potential", "unknown", "cells", "limits", "near", "levels", "far")
 
 
 class WalkFolder(FramedFolder):
@@ -156,6 +163,28 @@ class WalkFolder(FramedFolder):
         rows = [row.ravel() for row in list_rows(self.objects["items"], 1)]
         return starts_of([len(row) for row in rows]), np.concatenate([np.zeros(0, np.int64), *rows]).astype(np.int64)
 
+    @cached_property
+    def depth_meshes(self) -> DepthIndex:
+        """Which view cells have textured depth meshes, and where they lie.
+
+        Raises:
+            InputError: the table contradicts itself.
+        """
+        try:
+            return DepthIndex.of(self._table("depth_meshes"), self.objects.num_rows)
+        except InputError as error:
+            raise InputError(f"{self.folder / 'depth_meshes.parquet'}: {error}") from None
+
+    def depth_face(self, row: int, face: int) -> FaceItem:
+        """A face of the depth meshes of a row of `depth_meshes`, read from the file.
+
+        Raises:
+            InputError: the file is cut short or altered.
+        """
+        index = self.depth_meshes
+        data = self._read(int(index.offsets[row, face]), int(index.sizes[row, face]))
+        return decode_face(data, f"{self.folder / GEOMETRY}: depth mesh {face} of cell {index.cells[row]}")
+
     def row_of(self, cell_id: int) -> int:
         """The row of a view cell's sets.
 
@@ -177,15 +206,19 @@ class WalkFolder(FramedFolder):
         if not 0 <= item < self.items.num_rows:
             raise InputError(f"{self.folder}: expected an item below {self.items.num_rows}, found {item}")
         row = self.items.slice(item, 1).to_pylist()[0]
-        with (self.folder / GEOMETRY).open("rb") as file:
-            file.seek(row["offset"])
-            data = file.read(row["size"])
-        if len(data) != row["size"]:
-            where = f"{self.folder / GEOMETRY}: expected {row['size']} bytes of item {item}"
-            raise InputError(f"{where}, found {len(data)}")
+        data = self._read(row["offset"], row["size"])
         vertices, faces = item_mesh(data, row["vertices"], f"{self.folder / GEOMETRY}: item {item}")
         colours = colours_of(self.items.slice(item, 1), [faces])[0]
         return Mesh(vertices, faces, row["error_m"], colours)
+
+    def _read(self, offset: int, size: int) -> bytes:
+        """Bytes of the geometry."""
+        with (self.folder / GEOMETRY).open("rb") as file:
+            file.seek(offset)
+            data = file.read(size)
+        if len(data) != size:
+            raise InputError(f"{self.folder / GEOMETRY}: expected {size} bytes from {offset} on, found {len(data)}")
+        return data
 
     def stale(self) -> str:
         """One line if the bake that it was packed from has changed since; empty if not, or if it is not there."""
@@ -283,6 +316,12 @@ def _check_numbers(walk: WalkFolder) -> None:
     if (walk.limits >= np.diff(walk.object_items[0])[members]).any():
         raise InputError(f"{where}: expected levels that there are, found others")
     _ = walk.unknown, walk.potential_cells
+    try:
+        cells, levels = walk.sets["cell_id"].to_numpy(), np.diff(walk.object_items[0])
+        walk.depth_meshes.check(walk.potential, cells, levels, file_size)
+    except InputError as error:
+        where = walk.folder / "depth_meshes.parquet"
+        raise InputError(f"{where}: {str(error).removeprefix(f'{where}: ')}") from None
 
 
 def write_walk(folder: Path, facts: dict, tables: dict[str, pa.Table], geometry: Iterable[bytes]) -> dict:

@@ -36,7 +36,11 @@ def balls_scene(rng, count=40, spread=25.0) -> Scene:
     shapes, objects = [], []
     for number, (middle, size) in enumerate(zip(middles, rng.uniform(0.2, 2, count), strict=True)):
         lods = tuple(
-            Mesh(middle + size * ball.vertices, ball.faces.astype(np.int32), size * error)
+            Mesh(
+                (middle + size * ball.vertices).astype(np.float32).astype(float),
+                ball.faces.astype(np.int32),
+                size * error,
+            )
             for ball, error in zip(levels, errors, strict=True)
         )
         shapes.append(Definition(f"ball {number}", lods))

@@ -147,7 +147,7 @@ class _Judge:
         met = hit >= 0
         owner = self._owners[np.maximum(hit, 0)]
         distant = met & np.isin(owner, side.far)
-        nearer = np.where(met, self._unit * (1 / placed - 1 / far), 0.0)
+        nearer = np.where(met, self._unit * (_inverse(placed) - _inverse(far)), 0.0)
         nearer = self._at_best(eyes, way, far, nearer)
         point = eyes + way * np.where(met, far, 0.0)[:, None] - side.middle
         there = np.zeros(len(eyes), bool)
@@ -167,7 +167,7 @@ class _Judge:
             placed = self._on_meshes(
                 eyes[off] - self._side.middle, way[off] + np.cos(turn) * aside + np.sin(turn) * across
             )
-            again = self._unit * (1 / placed - 1 / far[off])
+            again = self._unit * (_inverse(placed) - _inverse(far[off]))
             nearer[off] = np.where(np.abs(again) < np.abs(nearer[off]), again, nearer[off])
         return nearer
 
@@ -221,6 +221,11 @@ class _Judge:
                 low = np.where(same, np.minimum(low, side.parallax[at]), low)
                 high = np.where(same, np.maximum(high, side.parallax[at]), high)
         return (low - SLANT <= parallax) & (parallax <= high + SLANT)
+
+
+def _inverse(depth: np.ndarray) -> np.ndarray:
+    """Of depths; an eye on a surface is at none."""
+    return 1 / np.maximum(depth, np.finfo(np.float64).tiny)
 
 
 def _cast(scene: EmbreeScene | None, origins: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -116,6 +116,18 @@ def add_pack(commands: argparse._SubParsersAction) -> None:
     pack.add_argument(
         "--flatten", action="store_true", help="give every object a copy of its shape; shared shapes by default"
     )
+    pack.add_argument(
+        "--depth-meshes",
+        choices=("auto", "all"),
+        help="textured depth meshes of what is far: auto where they pay, all wherever anything is far",
+    )
+    pack.add_argument(
+        "--triangles",
+        type=whole(1),
+        metavar="N",
+        help="with them, of a view cell to all sides, which cull boxes and levels are balanced for; 200,000 by default",
+    )
+    pack.add_argument("--along", metavar="PATH", help="with them, only view cells that hold an eye of this camera path")
     pack.add_argument("--overwrite", action="store_true", help="replace a display database of another bake, too")
     pack.add_argument(
         "--check",

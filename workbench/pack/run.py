@@ -2,7 +2,8 @@
 
 import os
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ from ...kernels.launch import Device
 from ...solvers.tour import count_runs, tour_order
 from ..bake.place import alone
 from ..export.sets import model_of
+from .depth import DepthItems, DepthSettings, make_depth_meshes
 
 # Of the order that runs are compared with.
 RANDOM_SEED = 0
@@ -45,6 +47,7 @@ def pack(
     out: str | Path | None = None,
     *,
     flatten: bool = False,
+    depth: DepthSettings | None = None,
     overwrite: bool = False,
     progress: bool = False,
 ) -> WalkFolder:
@@ -54,6 +57,7 @@ def pack(
         bake: the bake of a model, or its folder.
         out: folder to write; by default the bake's name with .walk, beside it.
         flatten: give every object a copy of its shape, in the scene's frame; else objects share their definitions'.
+        depth: which view cells get textured depth meshes of what is far; None for none.
         overwrite: replace a display database of another bake, too. One of this bake is taken as it is if it is up to
             date, and else replaced.
         progress: show how far it is on stderr.
@@ -72,7 +76,7 @@ def pack(
     out = Path(out) if out is not None else default_out(made)
     refuse_others(out, KIND)
     with shown(progress), alone(out, "display database"):
-        facts = _facts(made, out, flatten)
+        facts = _facts(made, out, flatten) | {"depth_meshes": None if depth is None else depth.facts}
         held = held_manifest(out, KIND)
         if held is not None and not overwrite:
             if all(held.get(name) == value for name, value in facts.items()):
@@ -84,7 +88,7 @@ def pack(
                     f"{out}: expected a display database of this bake, found one of {held['bake']['path']}; "
                     "--overwrite (overwrite=True) replaces it, another --out keeps both"
                 )
-        return _write(made, scene, out, facts)
+        return _write(made, scene, out, facts, depth)
 
 
 def _facts(bake: BakeFolder, out: Path, flatten: bool) -> dict:
@@ -103,10 +107,10 @@ def _facts(bake: BakeFolder, out: Path, flatten: bool) -> dict:
     }
 
 
-def _write(bake: BakeFolder, scene: Scene, out: Path, facts: dict) -> WalkFolder:
+def _write(bake: BakeFolder, scene: Scene, out: Path, facts: dict, depth: DepthSettings | None) -> WalkFolder:
     """Find the orders, make the tables, write them."""
     graph, device = bake.graph, Device.wanted("cpu")
-    with phase("pack", 4, "step") as bar:
+    with phase("pack", 3, "step") as bar:
         cells, made = np.flatnonzero(graph.inhabitable), np.arange(len(scene.objects))
         sets = display_sets(bake, cells, made)
         order = tour_order(sets.starts, sets.members, _middles(scene.object_bounds()), device)
@@ -116,6 +120,9 @@ def _write(bake: BakeFolder, scene: Scene, out: Path, facts: dict) -> WalkFolder
         runs = _runs_told(sets, order)
         sets, items = display_sets(bake, cells, order), gather_items(scene, order, facts["flattened"])
         bar.update()
+    with closing(DepthItems(int(items.offsets[-1]))) as far:
+        if depth is not None:
+            make_depth_meshes(far, bake, scene, sets, order, depth)
         tables = {
             "objects": objects_table(scene, order, items, facts["flattened"]),
             "items": items_table(items),
@@ -123,6 +130,7 @@ def _write(bake: BakeFolder, scene: Scene, out: Path, facts: dict) -> WalkFolder
             "cell_items": cell_items_table(sets),
             "cells": cells_table(graph, bake.grid_m).take(cell_order),
             "portals": portals_table(graph, bake.grid_m),
+            "depth_meshes": far.table,
         }
         counts = {
             "objects": len(scene.objects),
@@ -133,10 +141,10 @@ def _write(bake: BakeFolder, scene: Scene, out: Path, facts: dict) -> WalkFolder
             "portals": graph.portal_count,
             "potential": len(sets.members),
             "unknown": int(sets.unknown.sum()),
+            "depth_meshes": tables["depth_meshes"].num_rows,
         }
         facts = facts | {"counts": counts, "order": runs}
-        written = write_walk(out, facts, tables, geometry(items))
-        bar.update()
+        written = write_walk(out, facts, tables, chain(geometry(items), far.geometry()))
     return WalkFolder(out, written)
 
 

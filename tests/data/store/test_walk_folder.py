@@ -148,7 +148,7 @@ def test_a_file_that_is_cut_after_it_was_opened(folder):
     walk = read_walk(folder)
     _ = walk.items
     (folder / "geometry.bin").write_bytes(b"12345")
-    with pytest.raises(InputError, match=r"geometry\.bin: expected \d+ bytes of item 0, found 5"):
+    with pytest.raises(InputError, match=r"geometry\.bin: expected \d+ bytes from 0 on, found 5"):
         walk.mesh(0)
 
 
