@@ -1,6 +1,7 @@
 """Depth meshes of a display database as its index tells of them: which view cells have some, and where they lie."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pyarrow as pa
@@ -82,9 +83,14 @@ class DepthIndex:
         """View cells with depth meshes."""
         return len(self.cells)
 
+    @cached_property
+    def near_lists(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where the near objects of each row begin, and their display ids, ascending in each; `levels` are theirs."""
+        return self.near.ids()
+
     def near_levels(self, row: int) -> tuple[np.ndarray, np.ndarray]:
         """Near objects of a row, ascending, and their levels."""
-        starts, ids = self.near.ids()
+        starts, ids = self.near_lists
         own = slice(starts[row], starts[row + 1])
         return ids[own], self.levels[own]
 
@@ -100,7 +106,7 @@ class DepthIndex:
         Raises:
             InputError: the first thing that is not so.
         """
-        (near_starts, near), (far_starts, far) = self.near.ids(), self.far.ids()
+        (near_starts, near), (far_starts, far) = self.near_lists, self.far.ids()
         starts, members = sets.ids()
         rows = np.searchsorted(set_cells, self.cells)
         known = rows < len(set_cells)

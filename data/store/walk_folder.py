@@ -170,8 +170,15 @@ class WalkFolder(FramedFolder):
         Raises:
             InputError: the table contradicts itself.
         """
+        return self._depth_index(self._table("depth_meshes"))
+
+    def without_depth_meshes(self) -> DepthIndex:
+        """The same as if there were none."""
+        return self._depth_index(self._table("depth_meshes").slice(0, 0))
+
+    def _depth_index(self, table: pa.Table) -> DepthIndex:
         try:
-            return DepthIndex.of(self._table("depth_meshes"), self.objects.num_rows)
+            return DepthIndex.of(table, self.objects.num_rows)
         except InputError as error:
             raise InputError(f"{self.folder / 'depth_meshes.parquet'}: {error}") from None
 

@@ -16,7 +16,7 @@ from .set_items import Balls, Motion, SetItems, Shelves, turn_seconds
 
 # Share of the cache that is looked ahead to; the rest holds what was needed before.
 SHARE = 0.9
-# MMR's caches of 60 MB for near geometry, and of 80 MB for what stands for the far one: here the coarsest levels.
+# MMR's caches of 60 MB for near geometry, and of 80 MB for what stands for the far one.
 NEAR_SHARE = 60 / 140
 # Aliaga et al. 1999 say neither how slow slow is, nor how wide the way: half a walk, and as far as one looks.
 SLOW, WAY_DEG = 0.7, 45.0
@@ -66,6 +66,7 @@ class Stock:
         half_angle: from the middle of the screen to its corners [radians].
         motion: how eyes move.
         capacity: of the cache, bytes.
+        second: items that MMR's second cache is for: depth meshes, or, without any, coarsest levels; bool.
     """
 
     shelves: Shelves
@@ -77,6 +78,7 @@ class Stock:
     half_angle: float
     motion: Motion
     capacity: int
+    second: np.ndarray
 
     def reached(self, rows: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Items of rows, ascending, and the time before which the eye cannot be where each may be seen from [s].
@@ -148,8 +150,7 @@ class Policy:
     Attributes:
         name: as users type it.
         bounded: whether the cache may never be exceeded.
-        near_share: share of the cache that levels above the coarsest have to themselves, which have the rest; None for
-            one cache.
+        near_share: share of the cache for all but `Stock.second`, which has the rest; None for one cache.
     """
 
     name = ""
@@ -289,7 +290,7 @@ class AlongThePath(Policy):
             objects = self.stock.sets.objects[entries[sets.finest[entries]]]
             parts += [self.stock.shelves.coarsest[objects], sets.items[entries[sets.finest[entries]]]]
         whole = first_of_each(np.concatenate(parts))
-        far = self.stock.shelves.steps[whole] == 0
+        far = self.stock.second[whole]
         near = self.stock.cut(whole[~far], NEAR_SHARE * self.stock.capacity)
         far = self.stock.cut(whole[far], (1 - NEAR_SHARE) * self.stock.capacity)
         kept = np.zeros(len(self.stock.shelves.sizes), bool)

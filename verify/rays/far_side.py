@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from embreex.rtcore_scene import EmbreeScene
 
-from ...data.depth_meshes import FACES, FarSide
+from ...data.depth_meshes import FACES, DepthMesh, FarSide
 from ...data.scene import Role, Scene
 from .embree import embree_scene
 
@@ -57,17 +57,80 @@ class FarCheck:
         return FarCheck(**(total | {"worst": max(self.worst, other.worst)}))
 
 
-def placed_meshes(side: FarSide) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles of all meshes about the cell's middle [grid steps], shape (m, 3, 3), and their faces and layers."""
-    parts, owners, half = [np.zeros((0, 3, 3))], [np.zeros((0, 2), int)], side.ids.shape[1] / 2
-    for face, meshes in enumerate(side.meshes):
-        for layer, mesh in enumerate(meshes):
-            column, row = mesh.pixels.astype(np.float64).T
-            aside = np.stack([column + 0.5 - half, half - 0.5 - row, np.full(len(row), half - 1)])
-            corners = (aside * (side.reach / mesh.parallax.astype(np.float64))).T @ FACES[face]
-            parts.append(corners[mesh.triangles.astype(np.int64)])
-            owners.append(np.tile([[face, layer]], (len(mesh.triangles), 1)))
-    return np.concatenate(parts), np.concatenate(owners)
+def placed_triangles(mesh: DepthMesh, face: int, texels: int, reach: float) -> np.ndarray:
+    """A mesh's triangles about the middle of its cell, in the unit of `reach`, shape (m, 3, 3)."""
+    half, (column, row) = texels / 2, mesh.pixels.astype(np.float64).T
+    aside = np.stack([column + 0.5 - half, half - 0.5 - row, np.full(len(row), half - 1)])
+    return ((aside * (reach / mesh.parallax.astype(np.float64))).T @ FACES[face])[mesh.triangles.astype(np.int64)]
+
+
+class PlacedMeshes:
+    """Meshes about the middle of a cell, ready for rays."""
+
+    def __init__(self, meshes: tuple[tuple[DepthMesh, ...], ...], layers: np.ndarray, reach: float) -> None:
+        """Place them.
+
+        Args:
+            meshes: of each face, one for each layer.
+            layers: of each texel, shape (6, texels, texels).
+            reach: from the middle to the cell's corners, in the unit that rays are in.
+        """
+        self._layers, self.half = layers, layers.shape[1] / 2
+        # About the middle, so that float32 is as fine as can be. Layers lie in the same planes: each is met on its own.
+        self._scenes = []
+        for layer in range(max(map(len, meshes), default=0)):
+            having = [face for face, own in enumerate(meshes) if len(own) > layer]
+            parts = [placed_triangles(meshes[face][layer], face, layers.shape[1], reach) for face in having]
+            faces = np.repeat(having, [len(part) for part in parts])
+            self._scenes.append((embree_scene(np.concatenate(parts)), faces))
+
+    def meet(self, origins: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where rays about the middle first meet a mesh at a texel that it shows.
+
+        Args:
+            origins: shape (n, 3).
+            way: directions, shape (n, 3).
+
+        Returns:
+            The parameter, infinite for none, shape (n,), and face, row and column of the texel, shape (n, 3), int64.
+        """
+        out, texels = np.full(len(way), np.inf), np.zeros((len(way), 3), np.int64)
+        for layer in range(len(self._scenes)):
+            met, where = self.meet_layer(layer, origins, way)
+            nearer = met < out
+            out[nearer], texels[nearer] = met[nearer], where[nearer]
+        return out, texels
+
+    def meet_layer(self, layer: int, origins: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same for the meshes of one layer."""
+        along, out, rays = np.zeros(len(way)), np.full(len(way), np.inf), np.arange(len(way))
+        texels = np.zeros((len(way), 3), np.int64)
+        if layer >= len(self._scenes):
+            return out, texels
+        meshes, faces = self._scenes[layer]
+        for _ in range(PASSES):
+            hit, more = _cast(meshes, origins[rays] + along[rays, None] * way[rays], way[rays])
+            met = hit >= 0
+            rays, hit, more = rays[met], hit[met], more[met]
+            if not len(rays):
+                break
+            along[rays] += more
+            face = faces[hit]
+            column, row = self.places(origins[rays] + along[rays, None] * way[rays], face)
+            good = self._layers[face, row, column] == layer
+            out[rays[good]] = along[rays[good]]
+            texels[rays[good]] = np.column_stack([face, row, column])[good]
+            rays = rays[~good]
+            along[rays] *= 1 + 1e-6
+        return out, texels
+
+    def places(self, points: np.ndarray, face: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Column and row of points, seen from the middle on some faces."""
+        right, up, depth = np.einsum("nij,nj->in", FACES[face], points)
+        most = 2 * self.half - 1
+        column = np.floor(self.half + right / depth * (self.half - 1))
+        row = np.floor(self.half - up / depth * (self.half - 1))
+        return np.clip(column, 0, most).astype(int), np.clip(row, 0, most).astype(int)
 
 
 def check_far_side(
@@ -105,11 +168,8 @@ class _Judge:
         drawn = np.isin(owners, np.concatenate([side.far, side.unseen]))
         self._side, self._owners = side, owners[opaque]
         self._model, self._drawn = embree_scene(triangles[opaque]), embree_scene(triangles[drawn])
-        # About the middle, so that float32 is as fine as can be. Layers lie in the same planes: each is met on its own.
-        corners, found = placed_meshes(side)
-        parts = [found[:, 1] == layer for layer in range(int(found[:, 1].max(initial=-1)) + 1)]
-        self._layers = [(embree_scene(corners[part]), found[part, 0]) for part in parts]
-        self._half = side.ids.shape[1] / 2
+        self._meshes = PlacedMeshes(side.meshes, side.layers, side.reach)
+        self._half = self._meshes.half
         self._unit = (self._half - 1) * side.reach
         self._allowed = side.texel_error + SLANT
 
@@ -131,7 +191,7 @@ class _Judge:
             for shift in BESIDE / (half - 1):
                 left = np.flatnonzero((own == layer) & ~np.isfinite(placed))
                 near = way[left] + shift @ FACES[face[left], :2]
-                placed[left] = self._on_layer(layer, np.zeros((len(left), 3)), near)
+                placed[left] = self._meshes.meet_layer(layer, np.zeros((len(left), 3)), near)[0]
         both = (there >= 0) & np.isfinite(placed)
         eye = eyes - side.middle
         true, seen = (way * np.where(both, along, 1.0)[:, None] - eye for along in (depth, placed))
@@ -143,7 +203,7 @@ class _Judge:
         """Rays by what they meet first; see `FarCheck`."""
         side = self._side
         hit, far = _cast(self._model, eyes, way)
-        placed = self._on_meshes(eyes - side.middle, way)
+        placed, _ = self._meshes.meet(eyes - side.middle, way)
         met = hit >= 0
         owner = self._owners[np.maximum(hit, 0)]
         distant = met & np.isin(owner, side.far)
@@ -164,54 +224,17 @@ class _Judge:
         aside /= np.linalg.norm(aside, axis=1)[:, None] * (self._half - 1)
         across = np.cross(way[off], aside)
         for turn in np.arange(8) * np.pi / 4:
-            placed = self._on_meshes(
-                eyes[off] - self._side.middle, way[off] + np.cos(turn) * aside + np.sin(turn) * across
-            )
+            beside = way[off] + np.cos(turn) * aside + np.sin(turn) * across
+            placed, _ = self._meshes.meet(eyes[off] - self._side.middle, beside)
             again = self._unit * (_inverse(placed) - _inverse(far[off]))
             nearer[off] = np.where(np.abs(again) < np.abs(nearer[off]), again, nearer[off])
         return nearer
-
-    def _on_meshes(self, origins: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """Parameter where rays about the middle first meet a mesh at a texel that it shows; infinite for none."""
-        out = np.full(len(way), np.inf)
-        for layer in range(len(self._layers)):
-            out = np.minimum(out, self._on_layer(layer, origins, way))
-        return out
-
-    def _on_layer(self, layer: int, origins: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """The same for the meshes of one layer."""
-        if layer >= len(self._layers):
-            return np.full(len(way), np.inf)
-        meshes, faces = self._layers[layer]
-        along, out, rays = np.zeros(len(way)), np.full(len(way), np.inf), np.arange(len(way))
-        for _ in range(PASSES):
-            hit, more = _cast(meshes, origins[rays] + along[rays, None] * way[rays], way[rays])
-            met = hit >= 0
-            rays, hit, more = rays[met], hit[met], more[met]
-            if not len(rays):
-                break
-            along[rays] += more
-            face = faces[hit]
-            column, row = self._places(origins[rays] + along[rays, None] * way[rays], face)
-            good = self._side.layers[face, row, column] == layer
-            out[rays[good]] = along[rays[good]]
-            rays = rays[~good]
-            along[rays] *= 1 + 1e-6
-        return out
-
-    def _places(self, points: np.ndarray, face: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Column and row of points, seen from the middle on some faces."""
-        right, up, depth = np.einsum("nij,nj->in", FACES[face], points)
-        most = 2 * self._half - 1
-        column = np.floor(self._half + right / depth * (self._half - 1))
-        row = np.floor(self._half - up / depth * (self._half - 1))
-        return np.clip(column, 0, most).astype(int), np.clip(row, 0, most).astype(int)
 
     def _on_image(self, points: np.ndarray, owner: np.ndarray) -> np.ndarray:
         """Whether texels at or beside points, seen from the middle, show the same object as deep."""
         side = self._side
         face = np.argmax(points @ FACES[:, 2].T, axis=1)
-        column, row = self._places(points, face)
+        column, row = self._meshes.places(points, face)
         parallax = self._unit / (points * FACES[face, 2]).sum(axis=1)
         low, high = np.full(len(points), np.inf), np.full(len(points), -np.inf)
         for down in (-1, 0, 1):

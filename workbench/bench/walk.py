@@ -11,6 +11,7 @@ from ...data.store.walk_folder import WalkFolder, read_walk
 from ..pack.run import RANDOM_SEED
 from ..summary import table
 from ..walk.display import shelves_of
+from ..walk.far import FarFaces
 from ..walk.run import walk
 from ..walk.settings import ALL, DEFAULT_POLICY, WalkSettings
 from ..walk.tables import policies
@@ -71,8 +72,9 @@ def measure_walk(database: WalkFolder, frames: int, settings: WalkSettings) -> W
     Raises:
         InputError: as `walk`.
     """
-    walked = walk(database, frames=frames, settings=settings)
-    shelves = shelves_of(database, settings.polygon_bytes)
+    # Orders are of levels of objects.
+    walked = walk(database, frames=frames, settings=replace(settings, depth_meshes=False))
+    shelves = shelves_of(database, FarFaces(database, False), settings.polygon_bytes)
     owner, lod = (database.items[name].to_numpy() for name in ("owner", "lod"))
     orders = {
         RANDOM: np.random.default_rng(RANDOM_SEED).permutation(len(owner)),

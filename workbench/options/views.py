@@ -199,6 +199,12 @@ def add_walk(commands: argparse._SubParsersAction) -> None:
         help="what a triangle takes in your renderer's memory; as in the file by default. Nothing is read then",
     )
     walk.add_argument(
+        "--no-depth-meshes",
+        dest="depth_meshes",
+        action="store_false",
+        help="draw what stands on depth meshes as geometry; without them by default where the database has none",
+    )
+    walk.add_argument(
         "--real-time", action="store_true", help="frames at their times, drawn, read by a thread, and measured"
     )
     walk.add_argument(

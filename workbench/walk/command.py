@@ -24,6 +24,7 @@ def walk(options: argparse.Namespace) -> int:
         motion=Motion(options.speed, options.turn, options.ahead),
         polygon_bytes=options.polygon_bytes,
         timeout_s=options.timeout,
+        depth_meshes=options.depth_meshes,
         real_time=options.real_time,
     )
     from .pages import default_out, write_walk

@@ -27,6 +27,7 @@ from ...solvers.levels.pixel_error import PixelLimit, pixel_levels
 from ...solvers.levels.select_frames import Frame, LevelKeeper, frame_problem
 from ...solvers.walk.doorways import doorways
 from ...solvers.walk.set_items import Shelves
+from .far import NONE, FarFaces
 from .level_choice import LevelChoice
 
 # A level that deviates by less than this on the screen is good enough.
@@ -38,10 +39,11 @@ def part_of(path: CameraPath, frames: np.ndarray | slice) -> CameraPath:
     return replace(path, **{name: column[frames] for name, column in vars(path).items()})
 
 
-def shelves_of(walk: WalkFolder, polygon_bytes: int | None = None) -> Shelves:
-    """Levels of a database as items, at their sizes in the file or at so many bytes a triangle."""
+def shelves_of(walk: WalkFolder, far: FarFaces, polygon_bytes: int | None = None) -> Shelves:
+    """Levels and depth meshes as items, at their sizes in the file or at so many bytes a triangle."""
     faces, sizes = (walk.items[name].to_numpy().astype(np.int64) for name in ("faces", "size"))
-    return Shelves.of(*walk.object_items, sizes if polygon_bytes is None else polygon_bytes * faces, faces)
+    found = far.shelves(*walk.object_items, sizes, faces)
+    return found if polygon_bytes is None else replace(found, sizes=polygon_bytes * found.faces)
 
 
 def level_errors(walk: WalkFolder) -> np.ndarray:
@@ -93,7 +95,7 @@ class Shown:
     """A frame.
 
     Attributes:
-        objects: that the eye may see, ascending, int64.
+        objects: that the eye may see, ascending, int64; then faces of depth meshes.
         lods: level of each to be drawn, NOTHING for one that is left out, int64.
         pixels: that each covers, about, float64.
         cells: that the eye may see.
@@ -103,6 +105,10 @@ class Shown:
         switches: objects whose level changed since the frame before.
         dropped: objects for which the frame's time did not suffice.
         seconds: of computing: visibility, and levels.
+        row: of the depth meshes that are drawn, or NONE.
+        left: triangles at their finest of all that may be seen from the cells that hold the eye, and of what of it does
+            not stand on depth meshes.
+        mesh_triangles: of the depth meshes that are drawn.
     """
 
     objects: np.ndarray
@@ -115,18 +121,21 @@ class Shown:
     switches: int
     dropped: int
     seconds: tuple[float, float]
+    row: int
+    left: tuple[int, int]
+    mesh_triangles: int
 
 
 class Display:
     """Frames of one path after another."""
 
-    def __init__(self, walk: WalkFolder, screen: Screen, levels: LevelChoice, target_ms: float) -> None:
+    def __init__(self, walk: WalkFolder, screen: Screen, levels: LevelChoice, target_ms: float, far: FarFaces) -> None:
         """Prepare a database.
 
         Raises:
             InputError: a target that an empty frame does not meet.
         """
-        self.screen, self.cost, self._levels = screen, levels.cost, levels
+        self.screen, self.cost, self._levels, self.far = screen, levels.cost, levels, far
         self._grid_m, self.boxes = walk.grid_m, walk.boxes * walk.grid_m
         self.known = Known.of(walk)
         graph = replace(walk.graph, inhabitable=self.known.has)
@@ -142,6 +151,11 @@ class Display:
         self.tuples = tuples_of(shapes, list(enumerate(kinds)), self._benefit)
         self._factors = np.array([a.cost_factor for a in self._benefit.algorithms])[self.tuples.algorithm]
         self._keeper = self._new_keeper()
+        finest = faces[self._starts[:-1]].astype(np.int64)
+        self._set_triangles = np.zeros(len(self.known.has), np.int64)
+        self._set_triangles[self.known.cells] = _sums(finest[self.known.members], self.known.starts)
+        near_starts, near = far.index.near_lists
+        self._near_triangles = _sums(finest[near], near_starts)
 
     def _new_keeper(self) -> LevelKeeper:
         return LevelKeeper(len(self.boxes), self._levels.choose, self._levels.coherence)
@@ -154,8 +168,8 @@ class Display:
         """What all eyes of a path may see, at once."""
         return launch_eye(self._eye, path, self.screen)
 
-    def frame(self, path: CameraPath, at: int) -> Shown:
-        """The next frame of a path.
+    def frame(self, path: CameraPath, at: int, holders: np.ndarray) -> Shown:
+        """The next frame of a path, whose eye some cells hold.
 
         Raises:
             InputError: an eye that is not finite.
@@ -163,12 +177,15 @@ class Display:
         begin = time.perf_counter()
         found = launch_eye(self._eye, part_of(path, slice(at, at + 1)), self.screen)
         looked = time.perf_counter()
-        shown = self._choose(path, at, found.objects.astype(np.int64))
+        row = self.far.row(path.eyes[at], holders)
+        shown = self._choose(path, at, self.far.near(row, found.objects.astype(np.int64))[0], row)
         spent = looked - begin, time.perf_counter() - looked
-        return replace(shown, cells=len(found.cells), seconds=spent)
+        left = [int(self._set_triangles[holders].max(initial=0))]
+        left.append(left[0] if row == NONE else int(self._near_triangles[row]))
+        return replace(shown, cells=len(found.cells), seconds=spent, left=tuple(left))
 
-    def _choose(self, path: CameraPath, at: int, objects: np.ndarray) -> Shown:
-        """Levels of the objects that an eye may see."""
+    def _choose(self, path: CameraPath, at: int, objects: np.ndarray, row: int) -> Shown:
+        """Levels of the objects that an eye may see as geometry, beside depth meshes of a row."""
         before = min(at, 1)
         pair = part_of(path, slice(at - before, at + 1))
         sightings = sightings_of(self.boxes, pair, self.screen, np.full(len(objects), before), objects)
@@ -176,17 +193,32 @@ class Display:
         candidates = candidates_of(self._importance, self.tuples, sightings, self.screen, self._benefit)
         which = candidates.tuple_id
         costs = self._levels.cost.object_ns(self.tuples.primitives[which], candidates.pixels, self._factors[which])
-        limits = self.limits(eye, objects)
+        limits = np.maximum(self.limits(eye, objects), self.far.near(row, objects)[1])
+        faces = np.zeros(0, np.int64)
+        if row != NONE:
+            faces = self.far.in_view(row, eye, path.axes()[at], self.screen)
+        pixels = np.full(len(faces), self.screen.width * self.screen.height / max(1, len(faces)))
+        far_ns = self._levels.cost.object_ns(self.far.triangles(faces), pixels, np.ones(len(faces)))
         problem = self._within(frame_problem(sightings, candidates, before), candidates, limits)
-        found = self._keeper.choose(problem, candidates, costs, self._budget)
+        found = self._keeper.choose(problem, candidates, costs, max(0, self._budget - int(far_ns.sum())))
         lods = np.full(len(objects), NOTHING)
         lods[found.sightings] = self.tuples.lod[which[found.picked]]
-        own_ns = self._levels.cost.frame_s * (1 + self._levels.cost.margin) * 1e9
+        own_ns = self._levels.cost.frame_s * (1 + self._levels.cost.margin) * 1e9 + far_ns.sum()
         finest = np.maximum.reduceat(costs, candidates.starts[:-1]) if len(objects) else costs
+        none = np.zeros(len(faces), np.int64)
         return Shown(
-            objects, lods, sightings.pixels, 0, limits, int(own_ns + finest.sum()),
-            int(own_ns + costs[found.picked].sum()), found.switches, found.dropped, (0.0, 0.0),
+            np.append(objects, faces), np.append(lods, none), np.append(sightings.pixels, pixels), 0,
+            np.append(limits, none), int(own_ns + finest.sum()), int(own_ns + costs[found.picked].sum()),
+            found.switches, found.dropped, (0.0, 0.0), row, (0, 0), int(self.far.triangles(faces).sum()),
         )  # fmt: skip
+
+    def in_place(self, path: CameraPath, at: int, holders: np.ndarray, objects: np.ndarray) -> np.ndarray:
+        """What is drawn for the objects that a frame's eye may see: near ones, then faces in view of depth meshes."""
+        row = self.far.row(path.eyes[at], holders)
+        if row == NONE:
+            return objects
+        faces = self.far.in_view(row, path.eyes[at], path.axes()[at], self.screen)
+        return np.append(self.far.near(row, objects)[0], faces)
 
     def limits(self, eye: np.ndarray, objects: np.ndarray) -> np.ndarray:
         """The coarsest level of each object that is good enough for an eye [m], int64."""
@@ -212,6 +244,11 @@ class Display:
         enough = np.where((lod != NOTHING) & (lod <= np.repeat(limits[problem.sightings], sizes)), rank, 0)
         first = np.maximum.reduceat(enough, problem.starts[:-1])
         return problem.only(rank >= np.repeat(first, sizes))
+
+
+def _sums(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Of lists of values."""
+    return np.diff(np.append(0, np.cumsum(values))[starts])
 
 
 def check_path(walk: WalkFolder, path: CameraPath, holders: tuple[np.ndarray, np.ndarray]) -> None:

@@ -103,7 +103,7 @@ class Memory:
         self._table, self._group = shelves.table, np.zeros(len(shelves.sizes), np.int64)
         shares = [1.0]
         if policy.near_share is not None:
-            self._group, shares = (shelves.steps == 0).astype(np.int64), [policy.near_share, 1 - policy.near_share]
+            self._group, shares = policy.stock.second.astype(np.int64), [policy.near_share, 1 - policy.near_share]
         self.caches = [Cache(shelves.sizes, int(share * capacity), policy.bounded) for share in shares]
         self._gap = gap_bytes(line)
         # Bytes of resident items, where a source gives them.

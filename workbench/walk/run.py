@@ -21,9 +21,10 @@ from ...data.store.walk_folder import WalkFolder
 from ...solvers.levels.benefit import NOTHING
 from ...solvers.walk.policies import POLICIES, Now, Policy, Stock
 from ...solvers.walk.range_cells import RangeCells
-from ...solvers.walk.set_items import Balls, SetItems
+from ...solvers.walk.set_items import SetItems
 from .arrival import Arrivals, oracle_bytes, policy_bytes
 from .display import Display, Shown, check_path, shelves_of
+from .far import FarFaces
 from .level_choice import LevelChoice, read_level_choice
 from .memory import Layout, Memory, gap_bytes
 from .opened import Opened, opened
@@ -94,8 +95,9 @@ class _Tour:
         """Prepare everything, and refuse paths and caches that will not do."""
         walk = opened.walk
         self._opened, self._path, self._settings = opened, path, settings
-        self._display = Display(walk, settings.screen, levels, settings.target_ms)
-        shelves = shelves_of(walk, settings.polygon_bytes)
+        far = FarFaces(walk, settings.depth_meshes)
+        self._display = Display(walk, settings.screen, levels, settings.target_ms, far)
+        shelves = shelves_of(walk, far, settings.polygon_bytes)
         self._holders = cells_holding(walk.graph, path.eyes / walk.grid_m)
         self._ways = RangeCells(walk.graph, walk.grid_m)
         check_path(walk, path, self._holders)
@@ -105,19 +107,21 @@ class _Tour:
         half_angle = float(np.arctan(np.hypot(screen.width, screen.height) / 2 / screen.focal))
         self._row_of = np.full(walk.graph.cell_count, -1)
         self._row_of[known.cells] = np.arange(len(known.cells))
-        sets = SetItems.of(shelves, known.starts, known.members, self._display.cell_limits(walk.graph))
+        limits = self._display.cell_limits(walk.graph)
+        sets = SetItems.of(shelves, *far.sets(known.cells, known.starts, known.members, limits))
         self.stock = Stock(
             shelves,
             sets,
-            Balls.around(self._display.boxes),
+            far.balls(self._display.boxes),
             walk.graph,
             known.cells,
             walk.grid_m,
             half_angle,
             settings.motion,
             settings.cache_bytes,
+            np.arange(len(shelves.sizes)) >= walk.items.num_rows if len(far.index) else shelves.steps == 0,
         )
-        offsets = walk.items["offset"].to_numpy().astype(np.int64)
+        offsets = np.append(walk.items["offset"].to_numpy().astype(np.int64), far.index.offsets.ravel())
         real = settings.polygon_bytes is None
         self._layout = Layout(offsets if real else starts_of(shelves.sizes)[:-1], shelves.sizes, real)
         steps = np.diff(path.t)
@@ -151,10 +155,14 @@ class _Tour:
         """Refuse a cache that does not hold what one frame shows at its coarsest."""
         found, coarsest = self._display.seen(self._path), self.stock.shelves.coarsest
         least, worst = 0, 0
-        share = min([1.0, *(1 - p.near_share for p in self._kinds() if p.near_share is not None)])
+        shares = [p.near_share for p in self._kinds() if p.near_share is not None]
         for frame in range(len(self._path)):
-            items = np.unique(coarsest[found.objects[found.starts[frame] : found.starts[frame + 1]]])
-            size = int(np.ceil(self.stock.shelves.sizes[items].sum() / share))
+            objects = found.objects[found.starts[frame] : found.starts[frame + 1]].astype(np.int64)
+            items = np.unique(coarsest[self._display.in_place(self._path, frame, self._held(frame), objects)])
+            sizes, second = self.stock.shelves.sizes[items], self.stock.second[items]
+            parts = [sizes.sum()]
+            parts += [max(sizes[~second].sum() / near, sizes[second].sum() / (1 - near)) for near in shares]
+            size = int(np.ceil(max(parts)))
             least, worst = max((least, worst), (size, frame), key=lambda pair: pair[0])
         if self._settings.cache_bytes < least:
             raise InputError(
@@ -176,7 +184,7 @@ class _Tour:
             if not settings.real_time:
                 self._display.begin()
                 for frame in range(count):
-                    frames.append(self._display.frame(self._path, frame))
+                    frames.append(self._display.frame(self._path, frame, self._held(frame)))
                     bar.update()
             found, truths, arrivals = [], [], []
             for kind in self._kinds():
@@ -209,13 +217,14 @@ class _Tour:
     def _model(self) -> Model:
         """What there is in all."""
         walk, shelves, graph = self._opened.walk, self.stock.shelves, self._opened.walk.graph
-        finest = shelves.items[shelves.starts[:-1]]
-        primitives = int(shelves.faces[finest].sum())
+        finest = shelves.items[shelves.starts[: walk.objects.num_rows]]
+        primitives, count = int(shelves.faces[finest].sum()), walk.items.num_rows
         cost = self._display.cost
         seconds = float(cost.seconds(primitives, 0, len(finest)) * (1 + cost.margin))
         return Model(
-            graph.cell_count, walk.objects.num_rows, primitives, int(shelves.sizes.sum()), seconds, cost.line()
-        )
+            graph.cell_count, walk.objects.num_rows, primitives, int(shelves.sizes[:count].sum()), seconds, cost.line(),
+            int(shelves.sizes[count:].sum()),
+        )  # fmt: skip
 
     def _by(
         self, policy: Policy, frames: list[Shown], sampled: np.ndarray, judge: Judge | None, step: Callable[[], None]
@@ -226,7 +235,7 @@ class _Tour:
         if settings.real_time:
             slowed = settings.latency_ms > 0 or settings.bandwidth_mbit is not None
             reader: Reader = ThreadReader(self._opened.source, clock, self._line if slowed else None)
-            frames, drawing = [], Drawing(self._opened.walk, settings.screen)
+            frames, drawing = [], Drawing(self._opened.walk, settings.screen, self._display.far)
             self._display.begin()
         else:
             reader, drawing = SimulatedReader(source, self._line), None
@@ -238,7 +247,7 @@ class _Tour:
                 when = float(path.t[frame] - path.t[0])
                 if drawing is not None:
                     clock.wait_until(when)
-                    frames.append(self._display.frame(path, frame))
+                    frames.append(self._display.frame(path, frame, self._held(frame)))
                 begin = time.perf_counter()
                 now = self._now(frame, frames[frame])
                 looked = time.perf_counter() - begin
@@ -257,10 +266,14 @@ class _Tour:
             reader.close()
         return frames, tally.found(memory), truth
 
+    def _held(self, frame: int) -> np.ndarray:
+        """Cells that hold a frame's eye."""
+        return self._holders[1][self._holders[0][frame] : self._holders[0][frame + 1]]
+
     def _now(self, frame: int, shown: Shown) -> Now:
         """A frame as policies see it."""
         path, motion, shelves = self._path, self._settings.motion, self.stock.shelves
-        holders = self._holders[1][self._holders[0][frame] : self._holders[0][frame + 1]]
+        holders = self._held(frame)
         cells, length = self._ways.near(path.eyes[frame], holders, motion.speed * motion.ahead_s)
         rows, own = self._row_of[cells], self._row_of[holders]
         known = rows >= 0

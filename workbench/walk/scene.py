@@ -5,12 +5,16 @@ import warp as wp
 
 from ...data.animation import Animation
 from ...data.camera import NEAR_M, CameraPath, Screen
+from ...data.depth_meshes import FACES
 from ...data.errors import InputError
 from ...data.scene import Definition, Instance, Mesh, Role, Scene
+from ...data.store.depth_items import decode_face
 from ...data.store.ranges import Range, ReadFailed, Source
 from ...data.store.walk_folder import WalkFolder, item_mesh
 from ...kernels.raster import Images, device_triangles, launch_raster
 from ...solvers.levels.benefit import NOTHING
+from ...verify.rays.far_side import placed_triangles
+from .far import FarFaces
 
 # Bytes that are read at a time when everything is.
 LOT = 2**22
@@ -69,9 +73,9 @@ def _lots(offsets: np.ndarray, ends: np.ndarray) -> list[tuple[int, int]]:
 class Drawing:
     """Draws frames from the bytes of items that are there."""
 
-    def __init__(self, walk: WalkFolder, screen: Screen) -> None:
+    def __init__(self, walk: WalkFolder, screen: Screen, far: FarFaces) -> None:
         """Nothing is placed yet."""
-        self._walk, self._screen = walk, screen
+        self._walk, self._screen, self._far = walk, screen, far
         self._starts, self._items = walk.object_items
         self._vertices = walk.items["vertices"].to_numpy()
         self._transforms = walk.objects["transform"]
@@ -87,6 +91,9 @@ class Drawing:
         """Triangles of an object at a level [grid steps], (n, 3, 3), int32; what moves is where it is at t [s]."""
         if (number, lod) in self._placed:
             return self._placed[number, lod]
+        if number >= self._far.first:
+            self._placed[number, lod] = self._depth_meshes(number - self._far.first, held)
+            return self._placed[number, lod]
         walk, item = self._walk, int(self._items[self._starts[number] + lod])
         points, faces = item_mesh(held[item], int(self._vertices[item]), f"{walk.folder}: item {item}")
         transform = np.array(self._transforms[number].as_py()).reshape(4, 4)
@@ -99,13 +106,21 @@ class Drawing:
             self._placed[number, lod] = world[faces]
         return world[faces]
 
+    def _depth_meshes(self, number: int, held: dict[int, bytes]) -> np.ndarray:
+        """Triangles of all layers of a face, whole."""
+        index, (row, face) = self._far.index, divmod(number, len(FACES))
+        item = decode_face(held[self._walk.items.num_rows + number], f"{self._walk.folder}: depth mesh {number}")
+        reach, texels = index.reaches[row], int(index.texels[row])
+        parts = [np.zeros((0, 3, 3)), *(placed_triangles(mesh, face, texels, reach) for mesh in item.meshes)]
+        return np.round((np.concatenate(parts) + index.middles[row]) / self._walk.grid_m).astype(np.int32)
+
     def draw(self, path: CameraPath, at: int, objects: np.ndarray, lods: np.ndarray, held: dict[int, bytes]) -> Images:
-        """The object that each pixel of a frame shows.
+        """The object that each pixel of a frame shows; depth meshes whole, as a renderer looks at all of their pixels.
 
         Args:
             path: the eyes.
             at: which.
-            objects: display ids, shape (n,).
+            objects: display ids, and faces of depth meshes, shape (n,).
             lods: level of each, below 0 for what is not drawn.
             held: bytes of the items of all that is drawn.
         """
@@ -123,5 +138,5 @@ def draw(triangles: wp.array, calls: np.ndarray, path: CameraPath, at: int, scre
     """The object that each pixel of one frame of a path shows; draws as of `launch_raster`, eyes in metres."""
     return launch_raster(
         triangles, calls, np.array([0, len(calls)]), path.eyes[at : at + 1] / grid_m, path.axes()[at : at + 1],
-        width=screen.width, height=screen.height, focal=screen.focal, near=NEAR_M / grid_m,
+        width=screen.width, height=screen.height, focal=screen.focal, near=NEAR_M / grid_m, depths=True,
     )  # fmt: skip

@@ -30,6 +30,7 @@ class WalkSettings:
         polygon_bytes: what a triangle takes in the memory of a renderer whose vertices are larger than positions; None
             for what it takes in the file. With it nothing is read.
         timeout_s: for which an answer is awaited [s].
+        depth_meshes: draw what the database has of them in place of what stands on them.
         real_time: frames at their times, reads by a thread, times measured; else on a simulated clock.
 
     Raises:
@@ -46,6 +47,7 @@ class WalkSettings:
     motion: Motion = field(default_factory=Motion)
     polygon_bytes: int | None = None
     timeout_s: float = TIMEOUT_S
+    depth_meshes: bool = True
     real_time: bool = False
 
     def __post_init__(self) -> None:

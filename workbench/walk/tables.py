@@ -1,6 +1,7 @@
 """A walk as the papers tell one: Tables 3 to 6 of Funkhouser et al. 1996, and the policies side by side."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,7 +34,12 @@ class Table:
 
 def tables(walked: Walked) -> list[Table]:
     """All of them; times that were not measured are dashes, as on a simulated clock all but modelled ones."""
-    found = [times(walked), counts(walked), *(memory_times(walked, one) for one in walked.policies)]
+    found = [
+        times(walked),
+        counts(walked),
+        *reductions(walked),
+        *(memory_times(walked, one) for one in walked.policies),
+    ]
     found += [sets(walked, one) for one in walked.policies]
     return [*found, policies(walked)]
 
@@ -95,6 +101,28 @@ def counts(walked: Walked) -> Table:
         rows.append((name, *cells, *mean_most(shown[objects]), *mean_most(polygon_counts), *share(polygon_counts)))
     head = ("cells, mean", "most", "objects, mean", "most", "polygons, mean", "most", "% of model, mean", "most")
     return Table("Table 4: cells, objects and polygons rendered", ("cull method", *head), rows)
+
+
+def reductions(walked: Walked) -> list[Table]:
+    """Table 1 of Aliaga et al. 1999, if depth meshes are drawn: what each technique takes from what was left before."""
+    shown = walked.shown
+    if not shown["mesh_polygons"].any():
+        return []
+    meshes = shown["mesh_polygons"]
+    steps = [
+        ("entire model", np.full(len(meshes), walked.model.polygons)),
+        ("from-region set", shown["set_polygons"]),
+        ("textured depth meshes", shown["near_polygons"]),
+        ("view frustum", shown["polygons"] - meshes),
+        ("level of detail", shown["chosen_polygons"] - meshes),
+    ]
+    rows = [("entire model", *mean_most(steps[0][1]), "")]
+    for (_, before), (name, after) in pairwise(steps):
+        rows.append((name, *mean_most(after), f"{100 * (1 - after / np.maximum(1, before)).mean():.0f}"))
+    rows.append(("depth meshes' own", *mean_most(meshes), ""))
+    rows.append(("drawn in all", *mean_most(shown["chosen_polygons"]), ""))
+    head = "technique", "polygons left, mean", "most", "% removed, mean"
+    return [Table("Aliaga et al. 1999, Table 1: reduction of polygons", head, rows)]
 
 
 def memory_times(walked: Walked, one: PolicyFrames) -> Table:
@@ -164,6 +192,8 @@ def notes(walked: Walked) -> list[str]:
         f"{walked.place}: {counted(len(path), 'frame')} in {seconds:,.1f} s, index of {walked.index_bytes:,} bytes",
         f"levels chosen for {settings.target_ms:g} ms; {walked.model.cost}",
     ]
+    if walked.shown["mesh_polygons"].any():
+        found.append(f"depth meshes of {walked.model.depth_bytes:,} bytes beside {walked.model.bytes:,} of all levels")
     dropped = int(walked.shown["dropped"].sum())
     if dropped:
         found.append(f"{dropped:,} times an object was left out because the frame's time did not suffice")
@@ -227,7 +257,9 @@ def _quantile(values: np.ndarray, share: float, digits: int) -> str:
 
 def walk_text(walked: Walked) -> str:
     """Everything, for a terminal."""
-    shown = tables(walked) if len(walked.policies) == 1 else [*tables(walked)[:2], *_of_each(walked)]
+    shown = [times(walked), counts(walked), *reductions(walked), *_of_each(walked)]
+    if len(walked.policies) == 1:
+        shown = tables(walked)
     shown += [truth_table(walked), arrival_table(walked)] if walked.truths else []
     wrong = [
         f"frame {one.frame}, {truth.policy}: objects {sorted({*one.dropped, *one.undrawn})} are seen and not drawn, "

@@ -26,6 +26,7 @@ class Model:
         bytes: of all items.
         render_s: modelled time to draw all triangles, pixels left aside [s].
         cost: the cost model in words.
+        depth_bytes: of all depth meshes.
     """
 
     cells: int
@@ -34,6 +35,7 @@ class Model:
     bytes: int
     render_s: float
     cost: str
+    depth_bytes: int
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,9 @@ def shown_frames(frames: list[Shown], tuples: Tuples, shelves: Shelves) -> dict[
                 "cells": shown.cells,
                 "objects": len(shown.objects),
                 "polygons": int(shelves.faces[finest[shown.objects]].sum()),
+                "set_polygons": shown.left[0],
+                "near_polygons": shown.left[1],
+                "mesh_polygons": shown.mesh_triangles,
                 "chosen_objects": int(drawn.sum()),
                 "chosen_polygons": int(shelves.faces[items].sum()),
                 "finest_ms": shown.finest_ns / 1e6,
@@ -150,7 +155,9 @@ class Walked:
         model: all there is.
         index_bytes: read before the first frame.
         shown: a value for each frame: cells, objects and polygons that the eye may see, chosen_objects,
-            chosen_polygons, finest_ms and chosen_ms (modelled times to draw them), switches, dropped, eye_s, levels_s.
+            chosen_polygons, set_polygons and near_polygons (of all that may be seen from the view cell, without and
+            with depth meshes, whose own are mesh_polygons), finest_ms and chosen_ms (modelled times to draw them),
+            switches, dropped, eye_s, levels_s.
         policies: frames by each policy.
         truths: what checks of sampled frames found, by each policy; empty without.
         arrivals: bytes from nothing to what the eyes of these frames see, likewise.

@@ -11,12 +11,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...data.camera import CameraPath
+from ...data.depth_meshes import FACES
 from ...data.errors import InputError
 from ...data.store.bake_folder import read_bake
-from ...kernels.raster import device_triangles
+from ...data.store.depth_items import decode_face
+from ...data.store.ranges import Range
+from ...kernels.raster import Images, device_triangles
 from ...solvers.levels.benefit import NOTHING
+from ...verify.rays.far_side import PlacedMeshes
 from ...verify.rays.looks import INNER, Eyewitness
 from .display import Display, Shown
+from .far import NONE
 from .memory import MISSING, Stored
 from .opened import Opened
 from .scene import Drawing, draw, whole_scene
@@ -92,9 +97,10 @@ class Judge:
             InputError: its geometry cannot be read.
         """
         self._path, self._screen, self._grid_m = path, display.screen, opened.walk.grid_m
+        self._opened, self._far, self._pictures = opened, display.far, {}
         self._scene, self._graph = whole_scene(opened.walk, opened.source), opened.walk.graph
         self._witness = Eyewitness(self._scene, self._graph, _cracks(opened))
-        self._drawing = Drawing(opened.walk, display.screen)
+        self._drawing = Drawing(opened.walk, display.screen, display.far)
         triangles, owners = self._scene.triangles()
         self._triangles, count = device_triangles(triangles), len(self._scene.objects)
         self._starts = np.searchsorted(owners, np.arange(count + 1))
@@ -109,26 +115,36 @@ class Judge:
         rng = np.random.default_rng(frame)
         half = INNER * np.array([self._screen.width, self._screen.height]) / 2 / self._screen.focal
         along = _directions(rng.uniform(-half, half, (RAYS, 2)), axes)
-        seen, dropped, doubtful = self._witness.look(eye, along, shown.objects)
-        place = np.searchsorted(shown.objects, seen).clip(max=max(0, len(shown.objects) - 1))
-        known = shown.objects[place] == seen if len(shown.objects) else np.zeros(len(seen), bool)
-        lods, drawn = shown.lods[place[known]], stored.drawn[place[known]]
+        near = shown.objects < self._far.first
+        objects, levels, there = shown.objects[near], shown.lods[near], stored.drawn[near]
+        # What stands on depth meshes is kept, as far as they are there.
+        standing = self._far.index.far.of(shown.row) if shown.row != NONE else np.zeros(0, np.int64)
+        members = np.union1d(objects, standing)
+        seen, dropped, doubtful = self._witness.look(eye, along, members)
+        known = np.isin(seen, objects)
+        place = np.searchsorted(objects, seen[known])
+        lods, drawn = levels[place], there[place]
         undrawn = seen[known][(lods != NOTHING) & (drawn < 0) & (drawn != MISSING)]
-        whole, kept = self._picture(frame, np.arange(len(self._still))), self._picture(frame, shown.objects)
+        whole, kept = self._picture(frame, np.arange(len(self._still))), self._picture(frame, members)
         rows = np.flatnonzero((whole != kept).ravel())
-        wrong = self._wrong_pixels(eye, axes, rows, whole.ravel()[rows], shown.objects, rng)
-        picture = self._drawn_picture(frame, shown.objects, stored.drawn, held)
-        on_screen = shown.objects[(stored.drawn >= 0) & self._still[shown.objects]]
+        wrong = self._wrong_pixels(eye, axes, rows, whole.ravel()[rows], members, rng)
+        faces = shown.objects[~near][stored.drawn[~near] >= 0]
+        picture = self._with_meshes(frame, self._drawn_images(frame, objects, there, held), faces, shown.row)
+        on_screen = objects[(there >= 0) & self._still[objects]]
+        lost = np.isin(seen, standing).sum() if len(faces) < (~near).sum() else 0
         return FrameTruth(
-            frame, len(seen), dropped.tolist(), undrawn.tolist(), int((drawn == MISSING).sum()),
+            frame, len(seen), dropped.tolist(), undrawn.tolist(), int((drawn == MISSING).sum() + lost),
             int((lods == NOTHING).sum()), len(np.setdiff1d(on_screen, seen)), whole.size, len(rows), wrong,
             int((picture != whole).sum()), len(doubtful),
         )  # fmt: skip
 
     def visible_pixels(self, frame: int, shown: Shown) -> np.ndarray:
         """Pixels that show each object that the eye may see, all at the levels that were chosen, int64."""
-        picture = self._drawn_picture(frame, shown.objects, shown.lods, {}).ravel()
-        counts = np.bincount(picture[picture >= 0], minlength=len(self._still))
+        near = shown.objects < self._far.first
+        images = self._drawn_images(frame, shown.objects[near], shown.lods[near], {})
+        faces = shown.objects[~near]
+        picture = self._with_meshes(frame, images, faces, shown.row, name_faces=True).ravel()
+        counts = np.bincount(picture[picture >= 0], minlength=self._far.first + self._far.index.faces.size)
         return counts[shown.objects]
 
     def _picture(self, frame: int, objects: np.ndarray) -> np.ndarray:
@@ -136,12 +152,12 @@ class Judge:
         calls = np.column_stack([self._starts[objects], self._starts[objects + 1], objects])
         return draw(self._triangles, calls, self._path, frame, self._screen, self._grid_m).ids[0]
 
-    def _drawn_picture(self, frame: int, objects: np.ndarray, lods: np.ndarray, held: dict[int, bytes]) -> np.ndarray:
-        """The same of what was drawn: from the bytes that were there, or, where none are, from the model."""
+    def _drawn_images(self, frame: int, objects: np.ndarray, lods: np.ndarray, held: dict[int, bytes]) -> Images:
+        """The same of geometry that was drawn: from the bytes that were there, or, where none are, from the model."""
         still = self._still[objects]
         objects, lods = objects[still & (lods >= 0)], lods[still & (lods >= 0)]
         if held:
-            return self._drawing.draw(self._path, frame, objects, lods, held).ids[0]
+            return self._drawing.draw(self._path, frame, objects, lods, held)
         parts = []
         for number, lod in zip(objects.tolist(), lods.tolist(), strict=True):
             faces = self._scene.definitions[self._scene.objects[number].definition_id].lods[lod].faces
@@ -149,7 +165,47 @@ class Judge:
         ends = np.cumsum([0, *map(len, parts)])
         triangles = device_triangles(np.concatenate([*parts, np.zeros((0, 3, 3), np.int32)]))
         calls = np.column_stack([ends[:-1], ends[1:], objects])
-        return draw(triangles, calls, self._path, frame, self._screen, self._grid_m).ids[0]
+        return draw(triangles, calls, self._path, frame, self._screen, self._grid_m)
+
+    def _with_meshes(
+        self, frame: int, images: Images, faces: np.ndarray, row: int, *, name_faces: bool = False
+    ) -> np.ndarray:
+        """The object that each pixel shows, of geometry and some faces of a row's depth meshes, cast ray by ray.
+
+        Args:
+            frame: of the path.
+            images: of the geometry.
+            faces: ids of those that are there.
+            row: of them.
+            name_faces: give a face's id in place of the object's.
+        """
+        if not len(faces):
+            return images.ids[0]
+        if row not in self._pictures:
+            self._pictures = {row: self._placed(row)}
+        meshes, ids = self._pictures[row]
+        screen, eye = self._screen, self._path.eyes[frame] - self._far.index.middles[row]
+        y, x = np.divmod(np.arange(screen.width * screen.height), screen.width)
+        spots = np.column_stack([x + 0.5 - screen.width / 2, screen.height / 2 - 0.5 - y]) / screen.focal
+        # One along the axis of view, so that the parameter is the depth.
+        way = np.column_stack([spots, np.ones(len(spots))]) @ self._path.axes()[frame]
+        depth, (face, down, along) = (part.T for part in meshes.meet(np.repeat(eye[None], len(way), axis=0), way))
+        number = self._far.first + len(FACES) * row + face
+        own = np.isfinite(depth) & np.isin(number, faces)
+        own &= np.where(own, depth, 0.0) / self._grid_m * images.inverse_depths[0].ravel() < 1
+        shown = images.ids[0].ravel().copy()
+        shown[own] = number[own] if name_faces else ids[face[own], down[own], along[own]]
+        return shown.reshape(images.ids[0].shape)
+
+    def _placed(self, row: int) -> tuple[PlacedMeshes, np.ndarray]:
+        """Depth meshes of a row [m], and the object that each of their texels shows."""
+        index, items = self._far.index, []
+        for face in range(len(FACES)):
+            data = self._opened.source.read(Range(int(index.offsets[row, face]), int(index.sizes[row, face]), (), 0))
+            items.append(decode_face(data, f"{self._opened.place}: depth mesh {face} of cell {index.cells[row]}"))
+        layers, ranks = (np.stack([getattr(item, name) for item in items]) for name in ("layers", "ranks"))
+        meshes = PlacedMeshes(tuple(item.meshes for item in items), layers, float(index.reaches[row]))
+        return meshes, np.where(ranks < 0, -1, index.far.of(row)[ranks])
 
     def _wrong_pixels(
         self, eye: np.ndarray, axes: np.ndarray, rows: np.ndarray, shown: np.ndarray, kept: np.ndarray,

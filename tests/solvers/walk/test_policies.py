@@ -25,7 +25,8 @@ def stock(capacity=10_000, limits=0):
     sets = SetItems.of(shelves, starts, np.concatenate(members), np.full(starts[-1], limits))
     middle = np.repeat(graph.cells[ROOMS].mean(axis=1) * M, 2, axis=0)
     boxes = np.stack([middle - 0.1, middle + 0.1], axis=1)
-    return Stock(shelves, sets, Balls.around(boxes), graph, ROOMS, M, 0.6, Motion(2.0, 180.0, 1.0), capacity)
+    motion, second = Motion(2.0, 180.0, 1.0), shelves.steps == 0
+    return Stock(shelves, sets, Balls.around(boxes), graph, ROOMS, M, 0.6, motion, capacity, second)
 
 
 def now(room=0, rows=(0, 1), seconds=(0.0, 0.5), shown=(0,), wanted=(0,), velocity=(1.4, 0, 0), forward=(1.0, 0, 0)):

@@ -9,6 +9,7 @@ from viewcell.data.errors import InputError
 from viewcell.kernels.eye import launch_eye
 from viewcell.solvers.levels.benefit import NOTHING
 from viewcell.workbench.walk.display import Display, check_path, level_errors, part_of, shelves_of
+from viewcell.workbench.walk.far import FarFaces
 from viewcell.workbench.walk.level_choice import USUAL_COST, LevelChoice
 from viewcell.workbench.walk.path import walk as generated
 
@@ -17,7 +18,12 @@ SCREEN = Screen(320, 240)
 
 def frames_of(display, path):
     display.begin()
-    return [display.frame(path, at) for at in range(len(path))]
+    return [display.frame(path, at, np.zeros(0, np.int64)) for at in range(len(path))]
+
+
+@pytest.fixture(scope="module")
+def far(office):
+    return FarFaces(office, True)
 
 
 @pytest.fixture(scope="module")
@@ -25,8 +31,8 @@ def path(office):
     return generated(office, 40, everywhere=True)
 
 
-def test_with_time_enough_every_object_is_drawn_as_coarse_as_does(office, path):
-    display = Display(office, SCREEN, LevelChoice(), 1000.0)
+def test_with_time_enough_every_object_is_drawn_as_coarse_as_does(office, far, path):
+    display = Display(office, SCREEN, LevelChoice(), 1000.0, far)
     starts, _ = office.object_items
     errors, finest, coarsest = level_errors(office), 0, 0
     for at, shown in enumerate(frames_of(display, path)):
@@ -43,8 +49,8 @@ def test_with_time_enough_every_object_is_drawn_as_coarse_as_does(office, path):
     assert finest and coarsest
 
 
-def test_what_is_shown_is_what_the_eye_may_see(office, path):
-    display = Display(office, SCREEN, LevelChoice(), 16.0)
+def test_what_is_shown_is_what_the_eye_may_see(office, far, path):
+    display = Display(office, SCREEN, LevelChoice(), 16.0, far)
     together = launch_eye(display._eye, path, SCREEN)
     for at, shown in enumerate(frames_of(display, path)):
         own = together.objects[together.starts[at] : together.starts[at + 1]]
@@ -53,9 +59,9 @@ def test_what_is_shown_is_what_the_eye_may_see(office, path):
         assert len(own) - len(shown.objects) <= 2 and shown.cells == np.diff(together.cell_starts)[at]
 
 
-def test_short_times_are_kept_and_said(office, path):
+def test_short_times_are_kept_and_said(office, far, path):
     cost = replace(USUAL_COST, primitive_s=2e-5)
-    display = Display(office, SCREEN, LevelChoice(cost), 16.0)
+    display = Display(office, SCREEN, LevelChoice(cost), 16.0, far)
     found = frames_of(display, path)
     assert all(shown.chosen_ns <= 16e6 for shown in found)
     coarse = sum(int((shown.lods > shown.limits).sum()) for shown in found)
@@ -63,11 +69,11 @@ def test_short_times_are_kept_and_said(office, path):
     assert coarse + gone > 0 and gone == sum(int((shown.lods == NOTHING).sum()) for shown in found)
     assert all(shown.chosen_ns <= shown.finest_ns for shown in found)
     with pytest.raises(InputError, match="budget: expected more than"):
-        Display(office, SCREEN, LevelChoice(), 1.0)
+        Display(office, SCREEN, LevelChoice(), 1.0, far)
 
 
-def test_doorways_have_sets(office):
-    display = Display(office, SCREEN, LevelChoice(), 16.0)
+def test_doorways_have_sets(office, far):
+    display = Display(office, SCREEN, LevelChoice(), 16.0, far)
     known = display.known
     assert known.has.sum() == len(known.cells) > office.graph.inhabitable.sum()
     views = office.sets["cell_id"].to_numpy()
@@ -80,9 +86,9 @@ def test_doorways_have_sets(office):
     )
 
 
-def test_sizes_are_those_of_the_file_or_of_another_renderer(office):
-    assert shelves_of(office).sizes.tolist() == office.items["size"].to_pylist()
-    assert shelves_of(office, 158).sizes.tolist() == [158 * n for n in office.items["faces"].to_pylist()]
+def test_sizes_are_those_of_the_file_or_of_another_renderer(office, far):
+    assert shelves_of(office, far).sizes.tolist() == office.items["size"].to_pylist()
+    assert shelves_of(office, far, 158).sizes.tolist() == [158 * n for n in office.items["faces"].to_pylist()]
 
 
 def test_paths_must_lie_in_cells(office, path):

@@ -32,7 +32,7 @@ class Reader:
 
 
 def memory(ahead, capacity=1000, most=1000, near_share=None):
-    stock = SimpleNamespace(shelves=SHELVES, capacity=capacity)
+    stock = SimpleNamespace(shelves=SHELVES, capacity=capacity, second=SHELVES.steps == 0)
     wanted = np.array(ahead, int)
     policy = SimpleNamespace(stock=stock, near_share=near_share, bounded=True, ahead=lambda now, held: wanted)
     layout = Layout(np.array([0, 100, 200, 300]), SHELVES.sizes, True)

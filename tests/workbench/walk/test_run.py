@@ -148,11 +148,11 @@ def test_an_object_that_is_lost_stops_the_walk(office, capsys, monkeypatch, tmp_
 
     choose = Display._choose
 
-    def lossy(self, path, at, objects):
+    def lossy(self, path, at, objects, row):
         boxes = self.boxes[objects]
         middle = np.linalg.norm(boxes.mean(axis=1) - path.eyes[at], axis=1)
         size = np.prod(boxes[:, 1] - boxes[:, 0] + 0.01, axis=1) / middle
-        return choose(self, path, at, np.delete(objects, size.argmax()))
+        return choose(self, path, at, np.delete(objects, size.argmax()), row)
 
     monkeypatch.setattr(Display, "_choose", lossy)
     arguments = ["walk", str(office.folder), "--frames", "20", "--image", "64x48", "-o", str(tmp_path / "a")]
