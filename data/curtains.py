@@ -19,6 +19,7 @@ import numpy as np
 
 from .blockers import Blockers
 from .outlines import outline, tiles
+from .patience import OutOfTime, ask
 from .progress import track
 from .ragged import lots, places_of, starts_of
 from .scene import GRID_LIMIT, turned
@@ -50,10 +51,6 @@ TIP_STEPS = 400
 CLEAR_STEPS = 1.0
 
 
-class OutOfTime(Exception):
-    """Something is not made, as that would take longer than it may."""
-
-
 def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float, *, seconds: float = np.inf) -> Blockers:
     """Curtains of a model.
 
@@ -74,6 +71,7 @@ def find_curtains(elements: list[np.ndarray], faces: np.ndarray, grid_m: float, 
     for done, lot in enumerate(track(every := lots_of(firsts), "curtains", "lot")):
         if (time.perf_counter() - started) * (len(every) / done if done else 1.0) > seconds:
             raise OutOfTime
+        ask()
         mine, shifts = shifts[: len(lot)], shifts[len(lot) :]
         owner, quads = _sections(lot, least, THIN_M / grid_m)
         held = inside(quads, owner, lot)

@@ -14,6 +14,7 @@ from .exposed import UprightFace, face_pieces
 from .frame import wall_yaw
 from .hierarchy import build_levels
 from .incidence import CHUNK, clip_bounds
+from .patience import ask
 from .plans import NO_PLANS, Plans, are_convex, box_corners, turned_plan
 from .ragged import owners_of, places_of
 from .scene import Scene, bounds_by_owner, turned
@@ -74,6 +75,13 @@ def find_occludees(scene: Scene, exposed: dict[int, list[UprightFace]] | None = 
     if exposed:
         pieces, plans, owner = _face_by_face(scene, exposed, pieces, plans, owner)
     return _occludees(bounds, pieces, plans, owner)
+
+
+def box_occludees(scene: Scene) -> Occludees:
+    """As `find_occludees`, with one piece for every object, the box around it: looser, and no work."""
+    bounds = scene.object_bounds()
+    present = _present(bounds)
+    return _occludees(bounds, bounds[present].astype(np.int32), NO_PLANS, present)
 
 
 def turned_occludees(scene: Scene, yaw_deg: float) -> Occludees:
@@ -184,6 +192,7 @@ def _yaws(triangles: np.ndarray, owners: np.ndarray, count: int) -> np.ndarray:
     """How each object stands off the axes [degrees], 0 where it hardly does, shape (count,)."""
     starts, yaw = np.searchsorted(owners, np.arange(count + 1)), np.zeros(count)
     for number in np.unique(owners):
+        ask()
         own = triangles[starts[number] : starts[number + 1]].astype(float)
         own -= own.min(axis=(0, 1))
         yaw[number] = wall_yaw([(own.reshape(-1, 3), np.arange(3 * len(own)).reshape(-1, 3))], SNAPPED_DEG)

@@ -5,18 +5,21 @@ which merge them with sections of closed elements; patches, which are oblique. G
 when it is first asked for; a scene does not change once it is read.
 """
 
+import time
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
 
 from .blockers import Blockers, find_blockers, join_blockers
-from .curtains import OutOfTime, find_curtains
+from .curtains import find_curtains
 from .exposed import exposed_faces
 from .graph import CellGraph
-from .occludees import Occludees, find_occludees
+from .occludees import Occludees, box_occludees, find_occludees
 from .opaque import OpaquePlanes, carved_planes, opaque_planes
 from .patches import Patches, copied_patches, find_patches, join_outlines, rectangle_outlines
-from .regions import Regions, find_regions
+from .patience import OutOfTime, within
+from .regions import Regions, find_regions, join_regions
 from .room_cells import find_room_points
 from .scene import OPAQUE, Role, Scene
 from .skewed import find_sections, with_sections
@@ -39,11 +42,12 @@ class PreparedModel:
 
     Attributes:
         scene: the model.
+        whole: whether nothing has been left out for want of time.
     """
 
     def __init__(self, scene: Scene) -> None:
         """Nothing is computed yet."""
-        self.scene = scene
+        self.scene, self.whole = scene, True
 
     @cached_property
     def closed(self) -> list[tuple[int, np.ndarray]]:
@@ -104,8 +108,33 @@ class PreparedModel:
     @cached_property
     def regions(self) -> Regions:
         """Opaque regions of axial planes, sections of closed elements among them."""
+        return join_regions(self._region_parts())
+
+    def _region_parts(self) -> Iterator[tuple[int, Regions]]:
         solids = ([triangles for _, triangles in self.closed_of(role)] for role in OPAQUE)
-        return find_regions(self.blocking_planes, *solids, self.scene.grid_m)
+        yield from find_regions(self.blocking_planes, *solids, self.scene.grid_m)
+
+    def make_plainest(self, seconds: float) -> bool:
+        """Make occludees and regions in about so many seconds: whole objects and some regions, where that takes longer.
+
+        Returns:
+            Whether nothing was left out.
+        """
+        until, parts = time.perf_counter() + seconds, []
+        if "occludees" not in vars(self):
+            try:
+                with within(seconds):
+                    self.occludees = find_occludees(self.scene, exposed_faces(self.closed))
+            except OutOfTime:
+                self.occludees, self.whole = box_occludees(self.scene), False
+        if "regions" not in vars(self):
+            try:
+                with within(until - time.perf_counter()):
+                    parts.extend(self._region_parts())
+            except OutOfTime:
+                self.whole = False
+            self.regions = join_regions(parts)
+        return self.whole
 
     @cached_property
     def patches(self) -> Patches:

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .patience import ask
 from .ragged import owners_of, starts_of
 
 # No coordinate is so far out, searched ones included [grid steps].
@@ -68,9 +69,14 @@ class Rasters:
         return starts_of(self.sizes[0] * self.sizes[1])
 
     def lots(self) -> Iterator[tuple[int, "Rasters"]]:
-        """Rasters in lots of about LOT nodes: number of the first, and the rasters of each lot."""
+        """Rasters in lots of about LOT nodes: number of the first, and the rasters of each lot.
+
+        Raises:
+            OutOfTime: there is no time for the next lot.
+        """
         first = 0
         while first < len(self):
+            ask()
             stop = int(np.searchsorted(self.nodes, self.nodes[first] + LOT, side="right")) - 1
             stop = min(max(stop, first + 1), len(self))
             ends = [starts[first : stop + 1] for starts in self.starts]

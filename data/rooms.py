@@ -145,8 +145,9 @@ def _by_cell(cells: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _best(room: np.ndarray, target: np.ndarray, verdict: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pairs once each, VISIBLE where any of the same is, by room, then target."""
-    unseen = verdict != Verdict.VISIBLE
-    order = np.lexsort((unseen, target, room))
-    room, target, unseen = room[order], target[order], unseen[order]
-    first = np.append(True, (room[1:] != room[:-1]) | (target[1:] != target[:-1])) if len(room) else np.zeros(0, bool)
-    return room[first], target[first], np.where(unseen[first], Verdict.UNKNOWN, Verdict.VISIBLE)
+    # As single numbers, which are sorted many times faster than columns.
+    targets = int(target.max(initial=0)) + 1
+    keys = np.sort((room * targets + target) * 2 + (verdict != Verdict.VISIBLE))
+    pairs = keys >> 1
+    first = np.append(True, pairs[1:] != pairs[:-1])[: len(keys)]
+    return *np.divmod(pairs[first], targets), np.where(keys[first] & 1, Verdict.UNKNOWN, Verdict.VISIBLE)
