@@ -22,6 +22,7 @@ from .patience import OutOfTime, within
 from .regions import Regions, find_regions, join_regions
 from .room_cells import find_room_points
 from .scene import OPAQUE, Role, Scene
+from .shapes import extents
 from .skewed import find_sections, with_sections
 from .solids import closed_elements
 
@@ -99,7 +100,7 @@ class PreparedModel:
         least = BLOCKING_DETAIL_M2 / self.scene.grid_m**2
         boxes = []
         # Half of a large rectangle is a large triangle; the fans that close round tops are not worth looking at.
-        large = opaque_planes(triangles[_flat_area(np.ptp(triangles, axis=1)) >= least], oblique_steps=1)
+        large = opaque_planes(triangles[_flat_area(extents(triangles)) >= least], oblique_steps=1)
         for axis, (mine, others) in enumerate(zip(large.boxes, self.surfaces.boxes, strict=True)):
             both = np.concatenate([others, mine[_flat_area(mine[:, 1] - mine[:, 0]) >= least]])
             boxes.append(both[np.argsort(both[:, 0, axis], kind="stable")])
@@ -124,7 +125,7 @@ class PreparedModel:
         if "occludees" not in vars(self):
             try:
                 with within(seconds):
-                    self.occludees = find_occludees(self.scene, exposed_faces(self.closed))
+                    self.occludees = find_occludees(self.scene, exposed_faces(self.closed, self.scene.first_alike))
             except OutOfTime:
                 self.occludees, self.whole = box_occludees(self.scene), False
         if "regions" not in vars(self):
@@ -148,7 +149,7 @@ class PreparedModel:
         models = np.where(opaque, first[models], -1)
         # The extent bounds the area, and most triangles of a large model are small ones of furniture and pipes.
         large = np.flatnonzero((models == np.arange(len(models)))[owners])
-        large = large[_flat_area(np.ptp(corners[large], axis=1)) >= PATCH_SHARE * least]
+        large = large[_flat_area(extents(corners[large])) >= PATCH_SHARE * least]
         edges = (corners[large, 1:] - corners[large, :1]).astype(float)
         large = large[np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) >= 2 * PATCH_SHARE * least]
         found = find_patches(corners[large], owners[large], least_area=least)
@@ -188,7 +189,7 @@ class PreparedModel:
     @cached_property
     def occludees(self) -> Occludees:
         """Objects and their pieces: what may be hidden."""
-        return find_occludees(self.scene, exposed_faces(self.closed))
+        return find_occludees(self.scene, exposed_faces(self.closed, self.scene.first_alike))
 
     @cached_property
     def whole_occludees(self) -> Occludees:
@@ -207,4 +208,5 @@ def no_patches() -> Patches:
 
 def _flat_area(extent: np.ndarray) -> np.ndarray:
     """Area of the two longest sides of boxes with this extent, shape (n, 3), float64."""
-    return np.sort(extent.astype(float), axis=1)[:, 1:].prod(axis=1)
+    x, y, z = extent.T.astype(float)
+    return np.maximum(np.maximum(x * y, y * z), z * x)

@@ -124,10 +124,11 @@ def rooms_from_rooms(rooms: RoomCells, rows: Rows | None) -> tuple[np.ndarray, n
     """
     own = np.flatnonzero(np.diff(rooms.starts))
     silent = np.flatnonzero(~rooms.claims_rooms)
-    every = np.arange(rooms.count)
-    here, there = np.repeat(silent, rooms.count), np.tile(every, len(silent))
-    unknown = np.full(len(here), Verdict.UNKNOWN)
-    pairs = [(own, own, np.full(len(own), Verdict.VISIBLE)), (here, there, unknown), (there, here, unknown)]
+    every, loud = np.arange(rooms.count), np.flatnonzero(rooms.claims_rooms)
+    pairs = [(own, own, np.full(len(own), Verdict.VISIBLE))]
+    for rows_of, columns in ((silent, every), (loud, silent)):
+        here, there = np.repeat(rows_of, len(columns)), np.tile(columns, len(rows_of))
+        pairs.append((here, there, np.full(len(here), Verdict.UNKNOWN)))
     if rows is not None:
         room, cell, verdict = seen_from_rooms(rooms, rows)
         back = Rows.unseen(cell, room)

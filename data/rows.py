@@ -81,8 +81,11 @@ class Rows:
 
     def take(self, chosen: np.ndarray) -> "Rows":
         """Some rows (indices or bool), with their portals."""
-        columns = (self.source, self.target, self.verdict, self.origin, self.end)
-        out = Rows(*(column[chosen] for column in columns))
+        out = Rows.unseen(self.source[chosen], self.target[chosen])
+        out.verdict = self.verdict[chosen]
+        # As in `join`.
+        if self.origin.any() or self.end.any():
+            out.origin, out.end = self.origin[chosen], self.end[chosen]
         if self.portal_starts is not None:
             out.portal_starts, places = take_lists(self.portal_starts, chosen)
             out.portals = self.portals[places]

@@ -65,7 +65,7 @@ def device_triangles(
         nodes = build_hierarchy(boxes)
     else:
         nodes = build_of_copies(boxes, np.searchsorted(owners, np.arange(len(models) + 1)), models)
-    u, v = ((end - a).T.astype(float) for end in (b, c))
+    u, v = ((end - a).T.astype(float, order="C") for end in (b, c))
     square = sum((u[i - 2] * v[i - 1] - u[i - 1] * v[i - 2]) ** 2 for i in range(3))
     area = np.cumsum(np.sqrt(square))
     a, b, c = (device.corners(corner) for corner in (a, b, c))
