@@ -15,6 +15,7 @@ import numpy as np
 
 from .curtains import inside
 from .outlines import outline, tiles
+from .patience import ask
 from .plans import are_convex
 
 # A face at an angle is held by a prism that reaches so far into its element, and there ends so far short of its ends.
@@ -59,6 +60,7 @@ def exposed_faces(
     """
     solids, known, found = dict(closed), {}, {}
     for object_id, triangles in closed:
+        ask()
         model = object_id if models is None else int(models[object_id])
         if model not in known:
             known[model] = _upright_faces(triangles), triangles[0, 0].astype(np.int64)

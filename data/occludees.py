@@ -169,6 +169,7 @@ def _face_by_face(
     boxes, owners = [pieces[kept & ~planned]], [owner[kept & ~planned]]
     prisms, oblique = [upright[kept[plans.rows]]], [owner[kept & planned]]
     for object_id, faces in exposed.items():
+        ask()
         own = triangles[starts[object_id] : starts[object_id + 1]]
         level = own[np.ptp(own[:, :, 2], axis=1) == 0]
         one = np.zeros(len(level), np.int64)
@@ -216,6 +217,7 @@ def _cut_turned(
     ends = np.searchsorted(place, np.arange(len(numbers) + 1))
     corners = [np.zeros((0, 4, 3), np.int64)]
     for number in range(len(numbers)):
+        ask()
         own = triangles[starts[number] : starts[number + 1]].astype(np.int64) - bases[number]
         mine = boxes[ends[number] : ends[number + 1]]
         corners.append(_tight_plans(own, mine, yaw[numbers[number]]) + bases[number])

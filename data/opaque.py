@@ -16,6 +16,7 @@ import numpy as np
 from .apart import taken_apart
 from .graph import OTHER_AXES, flat_boxes
 from .outlines import OBLIQUE_STEPS, Covered, Outlines, cover, outline
+from .patience import ask
 from .shapes import extents
 
 
@@ -116,9 +117,11 @@ def _outlines(triangles: np.ndarray) -> tuple[Outlines, np.ndarray]:
         chosen = triangles[flat[:, axis]]
         corners.append(chosen[:, :, OTHER_AXES[axis]].astype(np.int64))
         planes.append(np.column_stack([np.full(len(chosen), axis), chosen[:, 0, axis]]))
+    ask()
     distinct, owner = np.unique(np.concatenate(planes), axis=0, return_inverse=True)
     flat = np.concatenate(corners)
     part, plane = taken_apart(owner.ravel(), np.stack([flat.min(axis=1), flat.max(axis=1)], axis=1), len(distinct))
+    ask()
     return outline(flat, part, len(plane)), distinct[plane]
 
 

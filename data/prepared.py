@@ -36,6 +36,8 @@ CURTAIN_M2 = 1.0
 # Oblique surfaces below this hide little, and are not made of triangles below the share.
 PATCH_M2 = 1.0
 PATCH_SHARE = 1 / 32
+# Share of the time for what is plainest that pieces of objects may take.
+PIECES_SHARE = 1 / 3
 
 
 class PreparedModel:
@@ -124,7 +126,7 @@ class PreparedModel:
         until, parts = time.perf_counter() + seconds, []
         if "occludees" not in vars(self):
             try:
-                with within(seconds):
+                with within(PIECES_SHARE * seconds):
                     self.occludees = find_occludees(self.scene, exposed_faces(self.closed, self.scene.first_alike))
             except OutOfTime:
                 self.occludees, self.whole = box_occludees(self.scene), False

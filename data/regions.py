@@ -115,11 +115,13 @@ def _connected(
         planes: coordinates, likewise.
         least: smaller parts are left out [squared grid steps].
     """
+    ask()
     owner, plane = taken_apart(owner, rectangles, len(planes))
     axes, planes = axes[plane], planes[plane]
     order = np.argsort(owner, kind="stable")
     owner, rectangles = owner[order], rectangles[order]
     points = [[(np.repeat(owner, 2), rectangles[:, :, c].ravel())] for c in (0, 1)]
+    ask()
     lots = list(Rasters.of(points, len(planes)).lots())
     for number in (k for turn in range(TURNS) for k in range(turn, len(lots), TURNS)):
         ask()
@@ -255,6 +257,7 @@ class _Sections:
         cuts: list[Cut] = []
         served: list[np.ndarray] = []
         for element in np.flatnonzero(~self._solid_box & self._large[:, axis] & (begin < end)).tolist():
+            ask()
             for cut, places in self._cuts(element, axis, np.arange(begin[element], end[element]), planes):
                 cuts.append(cut)
                 served.append(places)

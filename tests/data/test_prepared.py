@@ -1,5 +1,6 @@
 """A model prepared once: each part is made once, from the right triangles, and names what it is made of."""
 
+from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
 
@@ -7,11 +8,11 @@ import numpy as np
 import pytest
 import trimesh
 from builders import random_solids, small_house
-from viewcell.data import prepared, rasters, regions
+from builders.clocks import lots_take
+from viewcell.data import prepared, rasters
 from viewcell.data.buildings.arcade import ARCH_M, BAY_M, SPRING_M, make_arcade
 from viewcell.data.buildings.shell import OUTER_WALL_M
 from viewcell.data.patches import find_patches
-from viewcell.data.patience import OutOfTime
 from viewcell.data.prepared import PreparedModel, no_patches
 from viewcell.data.regions import no_regions
 from viewcell.data.scene import GRID_M, OPAQUE, Definition, Instance, Mesh, Role, Scene
@@ -175,17 +176,6 @@ def test_curtains_that_take_too_long_are_not_made():
     assert made.boxes.tolist() == PreparedModel(model.scene).curtains.boxes.tolist()
 
 
-def asked(monkeypatch, module, times):
-    """Of a module time runs out when it asks for the one after so many times."""
-    left = iter(range(times))
-
-    def ask():
-        if next(left, None) is None:
-            raise OutOfTime
-
-    monkeypatch.setattr(module, "ask", ask)
-
-
 def test_without_time_objects_are_whole_and_nothing_hides():
     model = PreparedModel(random_solids.random_solids(1))
     assert not model.make_plainest(-1.0) and not model.whole
@@ -208,12 +198,25 @@ def test_some_regions_are_sound_occluders_too(monkeypatch, times):
     """As many lots of planes as there was time for, from all over the model."""
     monkeypatch.setattr(rasters, "LOT", 16)
     whole = PreparedModel(random_solids.random_solids(1)).regions
-    asked(monkeypatch, regions, times)
+    lots_take(monkeypatch, 1.0)
     model = PreparedModel(random_solids.random_solids(1))
-    assert not model.make_plainest(1e6)
+    assert not model.make_plainest(times)
     found, every = ({(*box, int(axis)) for box, axis in zip(boxes, axes, strict=True)} for boxes, axes in (
         (part.boxes.reshape(-1, 6).tolist(), part.blockers.axis) for part in (model.regions, whole)
     ))  # fmt: skip
     assert 0 < len(found) < len(every) and found < every
     places = model.regions.places
     assert places[-1].tolist() == [len(model.regions.u), len(model.regions.v), len(model.regions.open_before)]
+
+
+def test_pieces_take_a_third_of_the_time(monkeypatch):
+    told = []
+
+    @contextmanager
+    def within(seconds):
+        told.append(seconds)
+        yield
+
+    monkeypatch.setattr(prepared, "within", within)
+    assert PreparedModel(random_solids.random_solids(1)).make_plainest(60.0)
+    assert told[0] == 20.0 and 20.0 < told[1] <= 60.0

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 import viewcell
-from builders.clocks import Clock
-from viewcell.data import rasters, regions
+from builders.clocks import Clock, lots_take
+from viewcell.data import rasters
 from viewcell.data.buildings.office import make_office
-from viewcell.data.patience import OutOfTime
 from viewcell.data.prepared import PreparedModel
 from viewcell.solvers.visibility.aim import Targets
 from viewcell.solvers.visibility.portal_engine import PortalEngine
@@ -141,13 +140,7 @@ def test_preparing_ends_early_and_every_set_is_sound(from_cells, monkeypatch, lo
     """With no regions nothing is culled; with some, some is."""
     full = from_cells("full")
     monkeypatch.setattr(rasters, "LOT", 64)
-    left = iter(range(lots))
-
-    def ask():
-        if next(left, None) is None:
-            raise OutOfTime
-
-    monkeypatch.setattr(regions, "ask", ask)
+    lots_take(monkeypatch, 50.0 / lots if lots else 200.0)
     made = from_cells("short", budget_s=100.0)
     assert made.manifest["budget"]["phase"] == "preparing" and made.manifest["budget_spent"]
     assert "ended early, while all that hides was prepared" in made.manifest["warnings"][-1]
