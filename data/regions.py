@@ -122,14 +122,14 @@ def _connected(
     owner, rectangles = owner[order], rectangles[order]
     points = [[(np.repeat(owner, 2), rectangles[:, :, c].ravel())] for c in (0, 1)]
     ask()
-    lots = list(Rasters.of(points, len(planes)).lots())
+    lots, known = list(Rasters.of(points, len(planes)).lots()), {}
     for number in (k for turn in range(TURNS) for k in range(turn, len(lots), TURNS)):
         ask()
         first, rasters = lots[number]
         a, b = np.searchsorted(owner, [first, first + len(rasters)])
         covered = rasters.paint(owner[a:b] - first, rectangles[a:b])
         plane, own, mask = _parts(rasters, covered, least)
-        yield number, _regions(axes[first + plane], planes[first + plane], own, mask)
+        yield number, _regions(axes[first + plane], planes[first + plane], own, mask, known)
 
 
 def _parts(rasters: Rasters, covered: np.ndarray, least: float) -> tuple[np.ndarray, Rasters, np.ndarray]:
@@ -173,13 +173,15 @@ def _parts(rasters: Rasters, covered: np.ndarray, least: float) -> tuple[np.ndar
     return owner[head[order]], own, own.paint(mine[mine >= 0], rectangles[mine >= 0])
 
 
-def _regions(axis: np.ndarray, plane: np.ndarray, rasters: Rasters, covered: np.ndarray) -> Regions:
-    """Regions of what each raster covers."""
+def _regions(
+    axis: np.ndarray, plane: np.ndarray, rasters: Rasters, covered: np.ndarray, known: dict[bytes, np.ndarray]
+) -> Regions:
+    """Regions of what each raster covers; `known` as of `Rasters.maximal`."""
     opened = rasters.sum_along(rasters.sum_along(~covered & (rasters.area > 0), 0), 1)
     before = np.zeros(len(covered), np.int32)
     cells = np.flatnonzero(rasters.area > 0)
     before[cells + rasters.sizes[1][rasters.owner[cells]] + 1] = opened[cells]
-    region, rectangles = rasters.maximal(covered, covered)
+    region, rectangles = rasters.maximal(covered, covered, known)
     boxes = flat_boxes(rectangles, axis[region], plane[region])
     places = np.stack([*rasters.starts, rasters.nodes], axis=1)
     u, v = (at.astype(np.int32) for at in rasters.coordinates)
