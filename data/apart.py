@@ -6,6 +6,7 @@ triangles that takes minutes, and most of it is empty.
 
 import numpy as np
 
+from .patience import ask
 from .rasters import FAR, Rasters
 
 # Rasters with more nodes are worth taking apart.
@@ -30,6 +31,7 @@ def taken_apart(owner: np.ndarray, rectangles: np.ndarray, count: int) -> tuple[
         return owner, np.arange(count)
     part, parts = owner[rows], 0
     while True:
+        ask()
         for axis in (0, 1):
             order = np.lexsort((rectangles[rows, 0, axis], part))
             low, high = (rectangles[rows[order], side, axis] + 2 * FAR * part[order] for side in (0, 1))

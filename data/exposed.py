@@ -15,6 +15,7 @@ import numpy as np
 
 from .curtains import inside
 from .outlines import outline, tiles
+from .patience import ask
 from .plans import are_convex
 
 # A face at an angle is held by a prism that reaches so far into its element, and there ends so far short of its ends.
@@ -48,14 +49,25 @@ class UprightFace:
         return way / length, length
 
 
-def exposed_faces(closed: list[tuple[int, np.ndarray]]) -> dict[int, list[UprightFace]]:
+def exposed_faces(
+    closed: list[tuple[int, np.ndarray]], models: np.ndarray | None = None
+) -> dict[int, list[UprightFace]]:
     """Uncovered upright faces of each element that has covered ones, and whose other faces are all level.
 
     Args:
         closed: (object_id, triangles (m, 3, 3) int32) of closed opaque elements, as of `closed_elements`.
+        models: of each object the first that is alike, as of `Scene.first_alike`: saves time.
     """
-    solids = dict(closed)
-    found = {object_id: own for object_id, triangles in closed if (own := _upright_faces(triangles)) is not None}
+    solids, known, found = dict(closed), {}, {}
+    for object_id, triangles in closed:
+        ask()
+        model = object_id if models is None else int(models[object_id])
+        if model not in known:
+            known[model] = _upright_faces(triangles), triangles[0, 0].astype(np.int64)
+        faces, corner = known[model]
+        if faces is not None:
+            shift = triangles[0, 0] - corner
+            found[object_id] = [UprightFace(face.ends + shift[:2], face.corners + shift) for face in faces]
     faces = [(object_id, face) for object_id, own in found.items() for face in own]
     behind = defaultdict(list)
     for place, (_, face) in enumerate(faces):

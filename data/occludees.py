@@ -14,6 +14,7 @@ from .exposed import UprightFace, face_pieces
 from .frame import wall_yaw
 from .hierarchy import build_levels
 from .incidence import CHUNK, clip_bounds
+from .patience import ask
 from .plans import NO_PLANS, Plans, are_convex, box_corners, turned_plan
 from .ragged import owners_of, places_of
 from .scene import Scene, bounds_by_owner, turned
@@ -74,6 +75,13 @@ def find_occludees(scene: Scene, exposed: dict[int, list[UprightFace]] | None = 
     if exposed:
         pieces, plans, owner = _face_by_face(scene, exposed, pieces, plans, owner)
     return _occludees(bounds, pieces, plans, owner)
+
+
+def box_occludees(scene: Scene) -> Occludees:
+    """As `find_occludees`, with one piece for every object, the box around it: looser, and no work."""
+    bounds = scene.object_bounds()
+    present = _present(bounds)
+    return _occludees(bounds, bounds[present].astype(np.int32), NO_PLANS, present)
 
 
 def turned_occludees(scene: Scene, yaw_deg: float) -> Occludees:
@@ -161,6 +169,7 @@ def _face_by_face(
     boxes, owners = [pieces[kept & ~planned]], [owner[kept & ~planned]]
     prisms, oblique = [upright[kept[plans.rows]]], [owner[kept & planned]]
     for object_id, faces in exposed.items():
+        ask()
         own = triangles[starts[object_id] : starts[object_id + 1]]
         level = own[np.ptp(own[:, :, 2], axis=1) == 0]
         one = np.zeros(len(level), np.int64)
@@ -184,6 +193,7 @@ def _yaws(triangles: np.ndarray, owners: np.ndarray, count: int) -> np.ndarray:
     """How each object stands off the axes [degrees], 0 where it hardly does, shape (count,)."""
     starts, yaw = np.searchsorted(owners, np.arange(count + 1)), np.zeros(count)
     for number in np.unique(owners):
+        ask()
         own = triangles[starts[number] : starts[number + 1]].astype(float)
         own -= own.min(axis=(0, 1))
         yaw[number] = wall_yaw([(own.reshape(-1, 3), np.arange(3 * len(own)).reshape(-1, 3))], SNAPPED_DEG)
@@ -207,6 +217,7 @@ def _cut_turned(
     ends = np.searchsorted(place, np.arange(len(numbers) + 1))
     corners = [np.zeros((0, 4, 3), np.int64)]
     for number in range(len(numbers)):
+        ask()
         own = triangles[starts[number] : starts[number + 1]].astype(np.int64) - bases[number]
         mine = boxes[ends[number] : ends[number + 1]]
         corners.append(_tight_plans(own, mine, yaw[numbers[number]]) + bases[number])

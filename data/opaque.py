@@ -16,6 +16,8 @@ import numpy as np
 from .apart import taken_apart
 from .graph import OTHER_AXES, flat_boxes
 from .outlines import OBLIQUE_STEPS, Covered, Outlines, cover, outline
+from .patience import ask
+from .shapes import extents
 
 
 class PlaneIndex:
@@ -110,13 +112,16 @@ def _outlines(triangles: np.ndarray) -> tuple[Outlines, np.ndarray]:
     Planes of much that lies apart are there several times.
     """
     corners, planes = [np.zeros((0, 3, 2), np.int64)], [np.zeros((0, 2), np.int64)]
+    flat = extents(triangles) == 0
     for axis in range(3):
-        chosen = triangles[np.ptp(triangles[:, :, axis], axis=1) == 0]
+        chosen = triangles[flat[:, axis]]
         corners.append(chosen[:, :, OTHER_AXES[axis]].astype(np.int64))
         planes.append(np.column_stack([np.full(len(chosen), axis), chosen[:, 0, axis]]))
+    ask()
     distinct, owner = np.unique(np.concatenate(planes), axis=0, return_inverse=True)
     flat = np.concatenate(corners)
     part, plane = taken_apart(owner.ravel(), np.stack([flat.min(axis=1), flat.max(axis=1)], axis=1), len(distinct))
+    ask()
     return outline(flat, part, len(plane)), distinct[plane]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from .patience import ask
 from .ragged import places_of
 from .rasters import Rasters
 
@@ -135,8 +136,10 @@ def outline(triangles: np.ndarray, owner: np.ndarray, count: int) -> Outlines:
     triangles = triangles.astype(np.int64)
     order = np.lexsort((triangles[:, :, 1], triangles[:, :, 0]), axis=1)
     triangles = np.take_along_axis(triangles, order[:, :, None], axis=1)
+    ask()
     rows = np.unique(np.column_stack([owner, triangles.reshape(-1, 6)]), axis=0)
     owner, triangles = rows[:, 0], rows[:, 1:].reshape(-1, 3, 2)
+    ask()
     a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     clockwise = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] < 0
     triangles = np.where(clockwise[:, None, None], triangles[:, ::-1], triangles)
@@ -144,7 +147,9 @@ def outline(triangles: np.ndarray, owner: np.ndarray, count: int) -> Outlines:
     turned = edges[:, [2, 3, 0, 1]]
     upward = (edges[:, :2] < turned[:, :2])[:, 0] | ((edges[:, 0] == turned[:, 0]) & (edges[:, 1] < turned[:, 1]))
     keyed = np.column_stack([np.repeat(owner, 3), np.where(upward[:, None], edges, turned)])
+    ask()
     keys, where = np.unique(keyed, axis=0, return_inverse=True)
+    ask()
     times = np.bincount(where.ravel(), np.where(upward, 1, -1), minlength=len(keys)).astype(np.int64)
     forward = np.repeat(keys, np.maximum(times, 0), axis=0)
     backward = np.repeat(keys[:, [0, 3, 4, 1, 2]], np.maximum(-times, 0), axis=0)

@@ -76,6 +76,9 @@ def find_own_frames(scene: Scene, closed: list[np.ndarray], cells: np.ndarray, p
 
 def _groups(scene: Scene, plans: Plans) -> list[tuple[float, np.ndarray, np.ndarray]]:
     """Yaw of each frame [degrees], the plans that fit it, and the rectangles around them, shape (n, 2, 2), int64."""
+    if not len(plans.rows):
+        # Directions of all walls of a model take seconds.
+        return []
     corners = plans.corners.astype(float)
     sides = np.roll(corners, -1, axis=1) - corners
     length = np.hypot(sides[:, :, 0], sides[:, :, 1])

@@ -5,20 +5,24 @@ which merge them with sections of closed elements; patches, which are oblique. G
 when it is first asked for; a scene does not change once it is read.
 """
 
+import time
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
 
 from .blockers import Blockers, find_blockers, join_blockers
-from .curtains import OutOfTime, find_curtains
+from .curtains import find_curtains
 from .exposed import exposed_faces
 from .graph import CellGraph
-from .occludees import Occludees, find_occludees
+from .occludees import Occludees, box_occludees, find_occludees
 from .opaque import OpaquePlanes, carved_planes, opaque_planes
 from .patches import Patches, copied_patches, find_patches, join_outlines, rectangle_outlines
-from .regions import Regions, find_regions
+from .patience import OutOfTime, within
+from .regions import Regions, find_regions, join_regions
 from .room_cells import find_room_points
 from .scene import OPAQUE, Role, Scene
+from .shapes import extents
 from .skewed import find_sections, with_sections
 from .solids import closed_elements
 
@@ -32,6 +36,8 @@ CURTAIN_M2 = 1.0
 # Oblique surfaces below this hide little, and are not made of triangles below the share.
 PATCH_M2 = 1.0
 PATCH_SHARE = 1 / 32
+# Share of the time for what is plainest that pieces of objects may take.
+PIECES_SHARE = 1 / 3
 
 
 class PreparedModel:
@@ -39,11 +45,12 @@ class PreparedModel:
 
     Attributes:
         scene: the model.
+        whole: whether nothing has been left out for want of time.
     """
 
     def __init__(self, scene: Scene) -> None:
         """Nothing is computed yet."""
-        self.scene = scene
+        self.scene, self.whole = scene, True
 
     @cached_property
     def closed(self) -> list[tuple[int, np.ndarray]]:
@@ -95,7 +102,7 @@ class PreparedModel:
         least = BLOCKING_DETAIL_M2 / self.scene.grid_m**2
         boxes = []
         # Half of a large rectangle is a large triangle; the fans that close round tops are not worth looking at.
-        large = opaque_planes(triangles[_flat_area(np.ptp(triangles, axis=1)) >= least], oblique_steps=1)
+        large = opaque_planes(triangles[_flat_area(extents(triangles)) >= least], oblique_steps=1)
         for axis, (mine, others) in enumerate(zip(large.boxes, self.surfaces.boxes, strict=True)):
             both = np.concatenate([others, mine[_flat_area(mine[:, 1] - mine[:, 0]) >= least]])
             boxes.append(both[np.argsort(both[:, 0, axis], kind="stable")])
@@ -104,8 +111,33 @@ class PreparedModel:
     @cached_property
     def regions(self) -> Regions:
         """Opaque regions of axial planes, sections of closed elements among them."""
+        return join_regions(self._region_parts())
+
+    def _region_parts(self) -> Iterator[tuple[int, Regions]]:
         solids = ([triangles for _, triangles in self.closed_of(role)] for role in OPAQUE)
-        return find_regions(self.blocking_planes, *solids, self.scene.grid_m)
+        yield from find_regions(self.blocking_planes, *solids, self.scene.grid_m)
+
+    def make_plainest(self, seconds: float) -> bool:
+        """Make occludees and regions in about so many seconds: whole objects and some regions, where that takes longer.
+
+        Returns:
+            Whether nothing was left out.
+        """
+        until, parts = time.perf_counter() + seconds, []
+        if "occludees" not in vars(self):
+            try:
+                with within(PIECES_SHARE * seconds):
+                    self.occludees = find_occludees(self.scene, exposed_faces(self.closed, self.scene.first_alike))
+            except OutOfTime:
+                self.occludees, self.whole = box_occludees(self.scene), False
+        if "regions" not in vars(self):
+            try:
+                with within(until - time.perf_counter()):
+                    parts.extend(self._region_parts())
+            except OutOfTime:
+                self.whole = False
+            self.regions = join_regions(parts)
+        return self.whole
 
     @cached_property
     def patches(self) -> Patches:
@@ -119,7 +151,7 @@ class PreparedModel:
         models = np.where(opaque, first[models], -1)
         # The extent bounds the area, and most triangles of a large model are small ones of furniture and pipes.
         large = np.flatnonzero((models == np.arange(len(models)))[owners])
-        large = large[_flat_area(np.ptp(corners[large], axis=1)) >= PATCH_SHARE * least]
+        large = large[_flat_area(extents(corners[large])) >= PATCH_SHARE * least]
         edges = (corners[large, 1:] - corners[large, :1]).astype(float)
         large = large[np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) >= 2 * PATCH_SHARE * least]
         found = find_patches(corners[large], owners[large], least_area=least)
@@ -159,7 +191,7 @@ class PreparedModel:
     @cached_property
     def occludees(self) -> Occludees:
         """Objects and their pieces: what may be hidden."""
-        return find_occludees(self.scene, exposed_faces(self.closed))
+        return find_occludees(self.scene, exposed_faces(self.closed, self.scene.first_alike))
 
     @cached_property
     def whole_occludees(self) -> Occludees:
@@ -178,4 +210,5 @@ def no_patches() -> Patches:
 
 def _flat_area(extent: np.ndarray) -> np.ndarray:
     """Area of the two longest sides of boxes with this extent, shape (n, 3), float64."""
-    return np.sort(extent.astype(float), axis=1)[:, 1:].prod(axis=1)
+    x, y, z = extent.T.astype(float)
+    return np.maximum(np.maximum(x * y, y * z), z * x)

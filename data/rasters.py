@@ -9,10 +9,12 @@ are no cells; masks of cells are false there, which keeps the runs of one line a
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import sha256
 
 import numpy as np
 
-from .ragged import owners_of, starts_of
+from .patience import ask
+from .ragged import owners_of, starts_of, take_lists
 
 # No coordinate is so far out, searched ones included [grid steps].
 FAR = 1 << 27
@@ -68,9 +70,14 @@ class Rasters:
         return starts_of(self.sizes[0] * self.sizes[1])
 
     def lots(self) -> Iterator[tuple[int, "Rasters"]]:
-        """Rasters in lots of about LOT nodes: number of the first, and the rasters of each lot."""
+        """Rasters in lots of about LOT nodes: number of the first, and the rasters of each lot.
+
+        Raises:
+            OutOfTime: there is no time for the next lot.
+        """
         first = 0
         while first < len(self):
+            ask()
             stop = int(np.searchsorted(self.nodes, self.nodes[first] + LOT, side="right")) - 1
             stop = min(max(stop, first + 1), len(self))
             ends = [starts[first : stop + 1] for starts in self.starts]
@@ -186,24 +193,63 @@ class Rasters:
         chosen = np.concatenate([along[fewer[along[:, 0]]], across[~fewer[across[:, 0]]]])
         return self._corners(chosen[np.argsort(chosen[:, 0], kind="stable")])
 
-    def maximal(self, blocked: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def maximal(
+        self, blocked: np.ndarray, wanted: np.ndarray, known: dict[bytes, np.ndarray] | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Rectangles of true cells of `blocked` that cannot grow and together cover `wanted`, which is part of it.
+
+        Args:
+            blocked: of each node, bool.
+            wanted: likewise.
+            known: what calls before found, which this one adds to: most rasters of a model are like others.
 
         Returns:
             As `tile`.
         """
-        (u_first, u_last), (v_first, v_last) = (self.runs(blocked, axis) for axis in (0, 1))
-        found: set[tuple[int, int, int, int, int]] = set()
+        known = {} if known is None else known
         # Rasters that are blocked throughout, as most small ones are, hold one rectangle.
         full = self._count(blocked) == (self.sizes[0] - 1) * (self.sizes[1] - 1)
-        whole = np.flatnonzero(full & (self._count(wanted) > 0))
+        sought = self._count(wanted) > 0
+        whole, others = np.flatnonzero(full & sought), np.flatnonzero(~full & sought)
+        # Which cells are in a rectangle does not depend on where they are, or how large.
+        masks = [mask.tobytes() for mask in ((blocked,) if wanted is blocked else (blocked, wanted))]
+        keys, fresh = [], {}
+        for raster, step, begin, end in zip(
+            others.tolist(),
+            self.sizes[1][others].tolist(),
+            self.nodes[others].tolist(),
+            self.nodes[others + 1].tolist(),
+            strict=True,
+        ):
+            key = sha256(step.to_bytes(8) + b"".join(mask[begin:end] for mask in masks)).digest()
+            keys.append(key)
+            if key not in known:
+                fresh.setdefault(key, raster)
+        chosen = np.array(list(fresh.values()), np.int64)
+        _, nodes = take_lists(self.nodes, chosen)
+        known |= zip(fresh, self._some(chosen)._grown(blocked[nodes], wanted[nodes]), strict=True)
+        found = [known[key] for key in keys]
         none = np.zeros(len(whole), np.int64)
         whole = np.column_stack([whole, none, self.sizes[0][whole] - 1, none, self.sizes[1][whole] - 1])
+        lines = np.concatenate([np.zeros((0, 4), np.int64), *found])
+        rows = np.concatenate([whole, np.column_stack([np.repeat(others, [len(part) for part in found]), lines])])
+        return self._corners(rows[np.argsort(rows[:, 0], kind="stable")])
+
+    def _some(self, chosen: np.ndarray) -> "Rasters":
+        """Some of the rasters."""
+        kept = [take_lists(starts, chosen) for starts in self.starts]
+        cut = tuple(at[places] for at, (_, places) in zip(self.coordinates, kept, strict=True))
+        return Rasters(cut, tuple(starts for starts, _ in kept))
+
+    def _grown(self, blocked: np.ndarray, wanted: np.ndarray) -> list[np.ndarray]:
+        """Rectangles of each raster as of `maximal`, ordered: first and past-the-last line along u, and along v."""
+        (u_first, u_last), (v_first, v_last) = (self.runs(blocked, axis) for axis in (0, 1))
+        found: list[set[tuple[int, int, int, int]]] = [set() for _ in range(len(self))]
         # Bytes are searched for the next cell that is left as fast as memory is read.
-        memory = bytearray((wanted & ~np.repeat(full, np.diff(self.nodes))).tobytes())
+        memory = bytearray(wanted.tobytes())
         left = np.frombuffer(memory, bool)
         starts, steps = self.nodes.tolist(), self.sizes[1].tolist()
-        cell = owner = -1
+        cell, owner = -1, 0
         while (cell := memory.find(1, cell + 1)) >= 0:
             while starts[owner + 1] <= cell:
                 owner += 1
@@ -213,13 +259,12 @@ class Rasters:
             column = slice(start + u0 * step + j, start + u1 * step + j, step)
             row = slice(start + i * step + v0, start + i * step + v1)
             # Grown along u, then along v; and the other way round.
-            tall = owner, u0, u1, int(v_first[column].max()), int(v_last[column].min())
-            wide = owner, int(u_first[row].max()), int(u_last[row].min()), v0, v1
-            for _, a, b, c, d in {tall, wide}:
+            tall = u0, u1, int(v_first[column].max()), int(v_last[column].min())
+            wide = int(u_first[row].max()), int(u_last[row].min()), v0, v1
+            for a, b, c, d in {tall, wide}:
                 left[start + a * step : start + b * step].reshape(-1, step)[:, c:d] = False
-            found |= {tall, wide}
-        rows = np.concatenate([whole, np.array(sorted(found), np.int64).reshape(-1, 5)])
-        return self._corners(rows[np.argsort(rows[:, 0], kind="stable")])
+            found[owner] |= {tall, wide}
+        return [np.array(sorted(own), np.int64).reshape(-1, 4) for own in found]
 
     def _count(self, mask: np.ndarray) -> np.ndarray:
         """True cells of each raster."""

@@ -6,7 +6,7 @@ the gaps that walls leave in each other's faces and merges what a model keeps ap
 wall that a person sees. Open, inverted or doubled meshes give no section; they lose occlusion, never safety.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -17,6 +17,7 @@ from .apart import taken_apart
 from .blockers import Blockers
 from .graph import OTHER_AXES, flat_boxes
 from .opaque import OpaquePlanes
+from .patience import ask
 from .ragged import places_of, starts_of
 from .rasters import Rasters
 from .sections import Cut, reaching, section_rectangles
@@ -31,6 +32,8 @@ ROUND_M2 = 2.0
 UPRIGHT = 1e-3
 # An oblique section of more triangles than this is left out: it costs more than it hides.
 SECTION_TRIANGLES = 200
+# Lots of planes are worked on every so many of them in turn: what there is no time for is then missing everywhere.
+TURNS = 8
 
 
 @dataclass
@@ -65,14 +68,19 @@ class Regions:
 
 def find_regions(
     opaque: OpaquePlanes, occluders: list[np.ndarray], details: list[np.ndarray], grid_m: float
-) -> Regions:
+) -> Iterator[tuple[int, Regions]]:
     """Regions of every plane that holds enough opaque surface, or the middle of a thin or oblique closed element.
+
+    In parts, as of `join_regions`; fewer of them are sound occluders, too.
 
     Args:
         opaque: opaque rectangles.
         occluders: triangles (m, 3, 3) of each closed element that is cut, int32.
         details: likewise of closed elements that are cut only if they are boxes and large enough.
         grid_m: grid step [m].
+
+    Raises:
+        OutOfTime: there is no time for the next part.
     """
     least = LEAST_M2 / grid_m**2
     elements = _Sections(occluders, details, least, ROUND_M2 / grid_m**2)
@@ -92,13 +100,13 @@ def find_regions(
         axes.append(np.full(len(wanted), axis, np.int32))
         planes.append(wanted.astype(np.int32))
     owner, rectangles = np.concatenate(owners), np.concatenate([np.zeros((0, 2, 2), np.int64), *found])
-    return _connected(owner, rectangles, np.concatenate(axes), np.concatenate(planes), least)
+    yield from _connected(owner, rectangles, np.concatenate(axes), np.concatenate(planes), least)
 
 
 def _connected(
     owner: np.ndarray, rectangles: np.ndarray, axes: np.ndarray, planes: np.ndarray, least: float
-) -> Regions:
-    """Connected parts of unions of rectangles of planes, and maximal rectangles of each.
+) -> Iterator[tuple[int, Regions]]:
+    """Connected parts of unions of rectangles of planes, and maximal rectangles of each; as of `find_regions`.
 
     Args:
         owner: plane of each rectangle, shape (n,).
@@ -107,18 +115,21 @@ def _connected(
         planes: coordinates, likewise.
         least: smaller parts are left out [squared grid steps].
     """
+    ask()
     owner, plane = taken_apart(owner, rectangles, len(planes))
     axes, planes = axes[plane], planes[plane]
     order = np.argsort(owner, kind="stable")
     owner, rectangles = owner[order], rectangles[order]
     points = [[(np.repeat(owner, 2), rectangles[:, :, c].ravel())] for c in (0, 1)]
-    found = [no_regions()]
-    for first, rasters in Rasters.of(points, len(planes)).lots():
+    ask()
+    lots, known = list(Rasters.of(points, len(planes)).lots()), {}
+    for number in (k for turn in range(TURNS) for k in range(turn, len(lots), TURNS)):
+        ask()
+        first, rasters = lots[number]
         a, b = np.searchsorted(owner, [first, first + len(rasters)])
         covered = rasters.paint(owner[a:b] - first, rectangles[a:b])
         plane, own, mask = _parts(rasters, covered, least)
-        found.append(_regions(axes[first + plane], planes[first + plane], own, mask))
-    return _joined(found)
+        yield number, _regions(axes[first + plane], planes[first + plane], own, mask, known)
 
 
 def _parts(rasters: Rasters, covered: np.ndarray, least: float) -> tuple[np.ndarray, Rasters, np.ndarray]:
@@ -162,21 +173,24 @@ def _parts(rasters: Rasters, covered: np.ndarray, least: float) -> tuple[np.ndar
     return owner[head[order]], own, own.paint(mine[mine >= 0], rectangles[mine >= 0])
 
 
-def _regions(axis: np.ndarray, plane: np.ndarray, rasters: Rasters, covered: np.ndarray) -> Regions:
-    """Regions of what each raster covers."""
+def _regions(
+    axis: np.ndarray, plane: np.ndarray, rasters: Rasters, covered: np.ndarray, known: dict[bytes, np.ndarray]
+) -> Regions:
+    """Regions of what each raster covers; `known` as of `Rasters.maximal`."""
     opened = rasters.sum_along(rasters.sum_along(~covered & (rasters.area > 0), 0), 1)
     before = np.zeros(len(covered), np.int32)
     cells = np.flatnonzero(rasters.area > 0)
     before[cells + rasters.sizes[1][rasters.owner[cells]] + 1] = opened[cells]
-    region, rectangles = rasters.maximal(covered, covered)
+    region, rectangles = rasters.maximal(covered, covered, known)
     boxes = flat_boxes(rectangles, axis[region], plane[region])
     places = np.stack([*rasters.starts, rasters.nodes], axis=1)
     u, v = (at.astype(np.int32) for at in rasters.coordinates)
     return Regions(axis, plane, places, u, v, before, boxes, region.astype(np.int32))
 
 
-def _joined(parts: list[Regions]) -> Regions:
-    """All of some regions, in order."""
+def join_regions(numbered: Iterable[tuple[int, Regions]]) -> Regions:
+    """All of some parts, in the order of their numbers."""
+    parts = [no_regions(), *(part for _, part in sorted(numbered, key=lambda found: found[0]))]
     places = np.concatenate([np.diff(part.places, axis=0) for part in parts])
     places = np.concatenate([np.zeros((1, 3), np.int64), np.cumsum(places, axis=0)])
     columns = {
@@ -245,6 +259,7 @@ class _Sections:
         cuts: list[Cut] = []
         served: list[np.ndarray] = []
         for element in np.flatnonzero(~self._solid_box & self._large[:, axis] & (begin < end)).tolist():
+            ask()
             for cut, places in self._cuts(element, axis, np.arange(begin[element], end[element]), planes):
                 cuts.append(cut)
                 served.append(places)

@@ -42,8 +42,20 @@ class Rows:
     def join(cls, parts: "list[Rows]") -> "Rows":
         """All of some rows, in order, without their portals."""
         parts = [cls.unseen(np.zeros(0), np.zeros(0)), *parts]
-        names = ("source", "target", "verdict", "origin", "end")
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        names = ("source", "target", "verdict")
+        joined = cls.unseen(*np.zeros((2, sum(map(len, parts)))))
+        joined.source, joined.target, joined.verdict = (
+            np.concatenate([getattr(part, name) for part in parts]) for name in names
+        )
+        begin = 0
+        for part in parts:
+            for name in ("origin", "end"):
+                points = getattr(part, name)
+                # Zeros are there already, and take no memory as long as nobody writes them.
+                if points.any():
+                    getattr(joined, name)[begin : begin + len(part)] = points
+            begin += len(part)
+        return joined
 
     def __len__(self) -> int:
         return len(self.source)
@@ -69,15 +81,21 @@ class Rows:
 
     def take(self, chosen: np.ndarray) -> "Rows":
         """Some rows (indices or bool), with their portals."""
-        columns = (self.source, self.target, self.verdict, self.origin, self.end)
-        out = Rows(*(column[chosen] for column in columns))
+        out = Rows.unseen(self.source[chosen], self.target[chosen])
+        out.verdict = self.verdict[chosen]
+        # As in `join`.
+        if self.origin.any() or self.end.any():
+            out.origin, out.end = self.origin[chosen], self.end[chosen]
         if self.portal_starts is not None:
             out.portal_starts, places = take_lists(self.portal_starts, chosen)
             out.portals = self.portals[places]
         return out
 
     def order(self) -> "Rows":
-        """Ordered by source, then target."""
+        """Ordered by source, then target; itself if it is."""
+        step = np.diff(self.source)
+        if ((step > 0) | ((step == 0) & (np.diff(self.target) >= 0))).all():
+            return self
         return self.take(np.lexsort((self.target, self.source)))
 
     def once(self) -> "Rows":

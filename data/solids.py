@@ -208,7 +208,9 @@ class SolidIndex:
         """
         self._starts = starts_of([len(triangles) for _, triangles in solids])
         self._triangles = np.concatenate([np.zeros((0, 3, 3), np.int32), *(triangles for _, triangles in solids)])
-        self._boxes = np.array([[t.min(axis=(0, 1)), t.max(axis=(0, 1))] for _, t in solids]).reshape(-1, 2, 3)
+        boxes = np.array([[t.min(axis=(0, 1)), t.max(axis=(0, 1))] for _, t in solids]).reshape(-1, 2, 3)
+        # Coordinate by coordinate: NumPy is many times slower along short axes.
+        self._low, self._high = (np.ascontiguousarray(boxes[:, side].T) for side in (0, 1))
         self._cells = cells
         self._near: dict[int, np.ndarray] = {}
 
@@ -235,15 +237,18 @@ class SolidIndex:
     def _boxed(self, points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points, and solids that reach into their cells, whose boxes hold them."""
         rows, solids = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-        for cell in np.unique(cells).tolist():
+        order, places = np.argsort(cells, kind="stable"), points.T
+        names, starts = np.unique(cells[order], return_index=True)
+        for cell, mine in zip(names.tolist(), np.split(order, starts)[1:], strict=True):
             if cell not in self._near:
                 low, high = self._cells[cell]
-                meet = (self._boxes[:, 0] < high).all(axis=1) & (self._boxes[:, 1] > low).all(axis=1)
-                self._near[cell] = np.flatnonzero(meet)
-            near, mine = self._near[cell], np.flatnonzero(cells == cell)
-            low, high = self._boxes[near].transpose(1, 0, 2)
-            own = points[mine, None]
-            row, solid = np.nonzero(((own >= low) & (own <= high)).all(axis=2))
+                meet = [(self._low[axis] < high[axis]) & (self._high[axis] > low[axis]) for axis in range(3)]
+                self._near[cell] = np.flatnonzero(meet[0] & meet[1] & meet[2])
+            near = self._near[cell]
+            held = np.ones((len(mine), len(near)), bool)
+            for own, low, high in zip(places[:, mine], self._low[:, near], self._high[:, near], strict=True):
+                held &= (own[:, None] >= low) & (own[:, None] <= high)
+            row, solid = np.nonzero(held)
             rows.append(mine[row])
             solids.append(near[solid])
         return np.concatenate(rows), np.concatenate(solids)

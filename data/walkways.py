@@ -12,6 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from .errors import InputError
+from .patience import ask
 from .prepared import PreparedModel
 from .ragged import lots, owners_of, places_of, starts_of
 from .scene import OPAQUE
@@ -103,6 +104,7 @@ def _surfaces(model: PreparedModel, column: int) -> tuple[np.ndarray, np.ndarray
     high = (2 * triangles[:, :, :2].max(axis=1).astype(np.int64) - column) // (2 * column)
     extent = np.maximum(high - low + 1, 0)
     for first, stop in lots(extent.prod(axis=1), LOT):
+        ask()
         sizes = extent[first:stop].prod(axis=1)
         own, at = np.repeat(np.arange(first, stop), sizes), places_of(0, sizes)
         across = low[own] + np.stack(np.divmod(at, extent[own, 1]), axis=1)

@@ -10,6 +10,7 @@ Source of the bound: Shewchuk 1997, "Adaptive Precision Floating-Point Arithmeti
 import numpy as np
 import warp as wp
 
+from ..data.ragged import places_of, take_lists
 from .hierarchy import Node, build_hierarchy, build_of_copies, inverse, item_of, nears, real, skip_of
 from .launch import CPU, Device, check_coordinates, launch_rows
 
@@ -62,16 +63,30 @@ def device_triangles(
     a, b, c = (np.ascontiguousarray(triangles[:, i]) for i in range(3))
     boxes = np.stack([least(least(a, b), c) for least in (np.minimum, np.maximum)], axis=1)
     if models is None:
-        nodes = build_hierarchy(boxes)
+        nodes, area = build_hierarchy(boxes), _areas(a, b, c)
     else:
-        nodes = build_of_copies(boxes, np.searchsorted(owners, np.arange(len(models) + 1)), models)
-    u, v = ((end - a).T.astype(float) for end in (b, c))
-    square = sum((u[i - 2] * v[i - 1] - u[i - 1] * v[i - 2]) ** 2 for i in range(3))
-    area = np.cumsum(np.sqrt(square))
+        starts = np.searchsorted(owners, np.arange(len(models) + 1))
+        nodes, area = build_of_copies(boxes, starts, models), _areas_of_copies(a, b, c, starts, models)
+    area = np.cumsum(area)
     a, b, c = (device.corners(corner) for corner in (a, b, c))
     opaque = np.ones(len(triangles), bool) if opaque is None else opaque
     columns = {"a": a, "b": b, "c": c, "owner": owners, "opaque": opaque, "running_area": area}
     return device.struct(Triangles, **columns, nodes=nodes.nodes)
+
+
+def _areas(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Twice the areas of triangles by their corners, each of shape (m, 3), int32."""
+    u, v = ((end - a).T.astype(float, order="C") for end in (b, c))
+    return np.sqrt(sum((u[i - 2] * v[i - 1] - u[i - 1] * v[i - 2]) ** 2 for i in range(3)))
+
+
+def _areas_of_copies(a: np.ndarray, b: np.ndarray, c: np.ndarray, starts: np.ndarray, models: np.ndarray) -> np.ndarray:
+    """The same of triangles of objects, of which those that are alike are measured once; as of `build_of_copies`."""
+    firsts = models == np.arange(len(models))
+    begins, rows = take_lists(starts, firsts)
+    own = np.zeros(len(models), np.int64)
+    own[firsts] = begins[:-1]
+    return _areas(*(corner.take(rows, axis=0) for corner in (a, b, c)))[places_of(own[models], np.diff(starts))]
 
 
 @wp.func

@@ -24,7 +24,6 @@ from ..kept import kept_shares
 from ..pair_sets import PairSets
 from ..rows import Rows
 from ..scene import Scene, turned
-from ..verdict import Verdict
 from . import certificates, room_tables
 from .framed import FramedFolder
 from .graph_folder import CELL_COLUMNS, PORTAL_COLUMNS, plan_column, read_graph
@@ -323,13 +322,17 @@ def leaks_table(cells: np.ndarray, objects: np.ndarray) -> pa.Table:
 
 def _witness_columns(rows: Rows, grid_m: float) -> dict[str, pa.Array]:
     # The grid step is a power of two, so metres hold the same points, and both ends are multiples of a 1024th of it.
-    values = np.concatenate([rows.origin * grid_m, rows.end * grid_m - rows.origin * grid_m], axis=1)
-    return {name: pa.array(values[:, i], mask=~rows.seen) for i, name in enumerate(WITNESS)}
+    seen = rows.seen
+    origin, end = (points[seen] * grid_m for points in (rows.origin, rows.end))
+    values = np.concatenate([origin, end - origin], axis=1).T.copy()
+    # Most rows of a bake that time ran out for have none.
+    place = pa.array(np.cumsum(seen) - 1, mask=~seen)
+    return {name: pa.array(column).take(place) for name, column in zip(WITNESS, values, strict=True)}
 
 
 def _pair_columns(rows: Rows, target: str) -> dict[str, pa.Array]:
     source, reached = (pa.array(column.astype(np.int32)) for column in (rows.source, rows.target))
-    return {"cell_id": source, target: reached, "verdict": pa.array(Verdict.words(rows.verdict), pa.string())}
+    return {"cell_id": source, target: reached, "verdict": room_tables.verdict_column(rows.verdict)}
 
 
 def _cell_to_cell_table(rows: Rows, grid_m: float) -> pa.Table:

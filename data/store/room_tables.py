@@ -46,6 +46,12 @@ def room_tables(spaces: list[Space], rooms: RoomCells, rows: tuple[Rows | None, 
     }
 
 
+def verdict_column(verdicts: np.ndarray) -> pa.Array:
+    """Words of an array of verdicts, as tables of a bake have them."""
+    words = [verdict.word for verdict in Verdict]
+    return pa.DictionaryArray.from_arrays(pa.array(verdicts.astype(np.int8)), words).cast(pa.string())
+
+
 def words_of_cells(rooms: pa.Table | None, names: np.ndarray) -> list[str]:
     """Rooms of each cell in a line, such as "A101 Foyer, Level 1"; the cell's own name where it has no room.
 
@@ -67,7 +73,7 @@ def _room_words(room: dict) -> str:
 
 
 def _pairs(columns: tuple[str, ...], room: np.ndarray, target: np.ndarray, verdict: np.ndarray) -> pa.Table:
-    words = pa.array(Verdict.words(verdict), pa.string())
+    words = verdict_column(verdict)
     values = pa.array(room.astype(np.int32)), pa.array(target.astype(np.int32)), words
     return pa.table(dict(zip(columns, values, strict=True)))
 

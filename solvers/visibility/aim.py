@@ -1,8 +1,12 @@
 """Sightlines shot from view cells: a model's triangles and solids on a device, ready to be aimed at."""
 
+import time
 from dataclasses import dataclass, replace
+from functools import cached_property
+from threading import Lock
 
 import numpy as np
+from embreex.rtcore_scene import EmbreeScene
 
 from ...data.plans import NO_PLANS, Plans
 from ...data.prepared import PreparedModel
@@ -19,6 +23,59 @@ from .first_hits import FirstHits
 # that is left, round by round.
 FIRST_TRIES = 12
 AIM_ROUNDS = (32, 128, 1024)
+# Triangles of the first objects that tell how long all take, of models that have more than LARGE.
+TRIAL, LARGE = 100_000, 500_000
+
+
+class Targets:
+    """A model's triangles, as sightlines from all view cells meet them: made when the first one is shot.
+
+    In a model of millions of triangles they take as long as the occluders, and hiding does without.
+
+    Attributes:
+        ranges: first and past-the-last triangle of each object, shape (objects, 2).
+    """
+
+    def __init__(self, model: PreparedModel, device: Device) -> None:
+        """Nothing is made yet."""
+        starts = model.scene.triangle_starts
+        self.ranges = np.column_stack([starts[:-1], starts[1:]])
+        self._model, self._device, self._making = model, device, Lock()
+        self._made: tuple[Triangles, Finder] | None = None
+
+    @property
+    def made(self) -> tuple[Triangles, Finder]:
+        """Triangles on the device, and on the CPU what finds sightlines that may be clear; made by one thread."""
+        self.make()
+        return self._made
+
+    @property
+    def opaque(self) -> EmbreeScene | None:
+        """Opaque triangles in Embree, in their order, if they are made."""
+        return None if self._made is None else self._made[1].scene
+
+    def make(self, seconds: float = np.inf) -> bool:
+        """Make them unless that should take longer, as the first objects tell; returns whether they are made."""
+        with self._making:
+            if self._made is None:
+                started, count = time.perf_counter(), int(self.ranges[-1:, 1].sum())
+                trial = int(np.searchsorted(self.ranges[:, 1], TRIAL)) + 1
+                if seconds < np.inf and count > LARGE:
+                    self._of_first(trial)
+                    share = self.ranges[trial - 1, 1] / count
+                    if (time.perf_counter() - started) / share > seconds:
+                        return False
+                self._made = self._of_first(len(self.ranges))
+            return True
+
+    def _of_first(self, count: int) -> tuple[Triangles, Finder]:
+        """As `made`, of so many objects."""
+        scene = self._model.scene
+        last, models = int(self.ranges[:count, 1].max(initial=0)), scene.first_alike[:count]
+        everything, owners = (column[:last] for column in scene.triangles())
+        opaque = scene.object_mask(*OPAQUE)[owners]
+        triangles = device_triangles(everything, owners, self._device, opaque=opaque, models=models)
+        return triangles, Finder(everything, owners, opaque, self._device, models)
 
 
 @dataclass
@@ -28,42 +85,49 @@ class Sights:
     Attributes:
         model: the model.
         cells: view cells [grid steps], shape (cells, 2, 3), int32; they may overlap each other and solids.
-        triangles: of all objects.
-        ranges: first and past-the-last triangle of each object, shape (objects, 2).
-        solids: closed elements by view cell.
+        targets: triangles of all objects.
         plans: of view cells that stand at an angle: eyes are inside them.
         seed: of the random sightlines.
         device: that holds the triangles.
-        finder: of sightlines that may be clear, on the CPU.
     """
 
     model: PreparedModel
     cells: np.ndarray
-    triangles: Triangles
-    ranges: np.ndarray
-    solids: SolidIndex
+    targets: Targets
     plans: Plans
     seed: int
     device: Device
-    finder: Finder
 
     @classmethod
     def of(
         cls, model: PreparedModel, cells: np.ndarray, seed: int, device: Device, plans: Plans = NO_PLANS
     ) -> "Sights":
-        """Copy a model's triangles to the device."""
-        scene = model.scene
-        everything, owners = scene.triangles()
-        opaque = scene.object_mask(*OPAQUE)[owners]
-        triangles = device_triangles(everything, owners, device, opaque=opaque, models=scene.first_alike)
-        starts = np.searchsorted(owners, np.arange(len(scene.objects) + 1))
-        ranges, solids = np.column_stack([starts[:-1], starts[1:]]), SolidIndex(cells, model.closed)
-        finder = Finder(everything, owners, opaque, device, scene.first_alike)
-        return cls(model, cells, triangles, ranges, solids, plans, seed, device, finder)
+        """Of a model, whose triangles are copied to the device when they are first asked."""
+        return cls(model, cells, Targets(model, device), plans, seed, device)
+
+    @property
+    def triangles(self) -> Triangles:
+        """Of all objects."""
+        return self.targets.made[0]
+
+    @property
+    def finder(self) -> Finder:
+        """Of sightlines that may be clear, on the CPU."""
+        return self.targets.made[1]
+
+    @property
+    def ranges(self) -> np.ndarray:
+        """First and past-the-last triangle of each object, shape (objects, 2)."""
+        return self.targets.ranges
+
+    @cached_property
+    def solids(self) -> SolidIndex:
+        """Closed elements by view cell."""
+        return SolidIndex(self.cells, self.model.closed)
 
     def from_cells(self, cells: np.ndarray) -> "Sights":
         """The same from other view cells, which stand along the axes."""
-        return replace(self, cells=cells, plans=NO_PLANS, solids=SolidIndex(cells, self.model.closed))
+        return replace(self, cells=cells, plans=NO_PLANS)
 
     def outside(self, source: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Points in their cells' boxes that are eyes: within the plan, certainly outside every solid, (n,), bool."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields
 from typing import Protocol
 
 import numpy as np
+from embreex.rtcore_scene import EmbreeScene
 
 from ...data.blockers import Blockers
 from ...data.patches import Patches
@@ -61,6 +62,22 @@ class Engine(Protocol):
     def proof_occluders(self) -> tuple[Blockers, Regions | None, Patches | None]:
         """What certificates name."""
 
+    @property
+    def opaque(self) -> EmbreeScene | None:
+        """Opaque triangles of the model in Embree, in its order, if `look` has made them."""
+
+    def begin(self, seconds: float = np.inf) -> bool:
+        """Make what `coarse` and `narrow` hide by, as much as there is time for.
+
+        Whoever does not call it has all of it made when it is first needed.
+
+        Returns:
+            Whether nothing had to be left out. Otherwise `prepare` makes nothing.
+        """
+
+    def look(self, seconds: float = np.inf) -> bool:
+        """Make what `glance` needs, unless that should take longer; returns whether it is made."""
+
     def prepare(self, seconds: float = np.inf) -> bool:
         """Make what `visible` needs and `coarse` does not, unless that should take longer; returns whether it is made.
 
@@ -91,8 +108,8 @@ class Engine(Protocol):
     def narrow(self, rows: Rows, step: int) -> Rows:
         """Those of some pairs that may be seen that are not hidden at a step, as of `narrowed`."""
 
-    def unknown(self, block: np.ndarray) -> Part:
-        """Rows that claim nothing: everything stays potential."""
+    def unknown(self, block: np.ndarray, objects: Rows | None = None) -> Part:
+        """Rows that claim nothing: everything stays potential, but of objects only those that are given, if any are."""
 
     def join(self, parts: list[Part], *, share: bool = True) -> tuple[Rows | None, Rows]:
         """Tables of all blocks: cells, if anything is claimed of them, and objects; ordered.

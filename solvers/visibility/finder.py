@@ -19,6 +19,7 @@ class Finder:
     Attributes:
         triangles: all of them [grid steps], shape (m, 3, 3), int32.
         owners: object of each, and -1 for none, shape (m + 1,), int.
+        scene: the opaque ones in Embree, in their order; None if there are none.
     """
 
     def __init__(
@@ -30,16 +31,16 @@ class Finder:
         models: np.ndarray | None = None,
     ) -> None:
         """Build the scene of those triangles that are opaque, shape (m,), bool; `models` as of `device_triangles`."""
-        self.triangles, self.owners, self._device, self._scene = triangles, np.append(owners, -1), device, None
+        self.triangles, self.owners, self._device, self.scene = triangles, np.append(owners, -1), device, None
         self._index = np.append(np.flatnonzero(opaque), -1)
         if opaque.any():
-            self._scene = EmbreeScene(robust=True)
+            self.scene = EmbreeScene(robust=True)
             models = np.arange(int(owners.max()) + 1) if models is None else models
             # Most of the time goes into handing over corners, one by one.
             corners, places = shared_corners(triangles, np.searchsorted(owners, np.arange(len(models) + 1)), models)
-            TriangleMesh(self._scene, corners.astype(np.float32), places[opaque])
+            TriangleMesh(self.scene, corners.astype(np.float32), places[opaque])
             # The first ray commits the scene, which must not happen on two threads at once.
-            self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+            self.scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
 
     def may_be_clear(self, rows: np.ndarray, origins: np.ndarray, ends: np.ndarray) -> np.ndarray:
         """As of `Guide`: those that meet no opaque triangle."""
@@ -51,13 +52,13 @@ class Finder:
 
     def first(self, origins: np.ndarray, ends: np.ndarray) -> np.ndarray:
         """First triangle that each sightline meets before its end, -1 for none; shape (n,), int."""
-        if self._scene is None:
+        if self.scene is None:
             return np.full(len(origins), -1)
 
         def cast(begin: int) -> np.ndarray:
             start, ways = origins[begin : begin + RUN], ends[begin : begin + RUN] - origins[begin : begin + RUN]
             reach = np.ones(len(start), np.float32)
-            return self._index[self._scene.run(start.astype(np.float32), ways.astype(np.float32), dists=reach)]
+            return self._index[self.scene.run(start.astype(np.float32), ways.astype(np.float32), dists=reach)]
 
         runs = range(0, len(origins), RUN)
         threads = self._device.threads_here

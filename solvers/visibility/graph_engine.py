@@ -43,6 +43,19 @@ class GraphEngine:
         """As of `Engine`."""
         return self.model.blockers, None, None
 
+    @property
+    def opaque(self) -> None:
+        """As of `Engine`: there are no triangles."""
+        return None
+
+    def begin(self, seconds: float = np.inf) -> bool:
+        """As of `Engine`: all is made."""
+        return True
+
+    def look(self, seconds: float = np.inf) -> bool:
+        """As of `Engine`: there are no objects."""
+        return True
+
     def prepare(self, seconds: float = np.inf) -> bool:
         """As of `Engine`: all is made."""
         return True
@@ -72,7 +85,7 @@ class GraphEngine:
         """As of `Engine`: there are no objects."""
         return 0
 
-    def unknown(self, block: np.ndarray) -> Part:
+    def unknown(self, block: np.ndarray, objects: Rows | None = None) -> Part:
         """As of `Engine`."""
         return Part(unknown_rows(block, self.model.graph.cell_count), NO_OBJECTS)
 

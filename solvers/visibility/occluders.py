@@ -77,6 +77,7 @@ class OccluderModel:
         shadows: bool = True,
         certify: bool = False,
         rough: bool = False,
+        bare: bool = False,
     ) -> "OccluderModel":
         """Copy a prepared model's occluders to the device.
 
@@ -87,16 +88,18 @@ class OccluderModel:
             certify: hide only as certificates can say it: not in frames of view cells at an angle, and every face for
                 itself, also where another element stands against it.
             rough: strong rectangles alone, where lines are to hide; curtains of a large model take most of the time.
+            bare: no regions and patches beside them, where there is no time to make those.
         """
         model, device = sights.model, sights.device
-        regions, patches = (model.regions, model.patches) if shadows else (no_regions(), no_patches())
+        regions = model.regions if shadows else no_regions()
+        patches = model.patches if shadows and not bare else no_patches()
         walls = model.walls if shadows and not rough else regions.blockers
         if blockers is not None:
             walls = join_blockers([blockers, walls])
         if rough:
             walls = strong_blockers(walls, STRONG_M / model.scene.grid_m)
         smallest = tuple(round(size / model.scene.grid_m) for size in SMALLEST_M)
-        shields = device_shields(regions, patches, device)
+        shields = device_shields(*((no_regions(), no_patches()) if bare else (regions, patches)), device)
         wanted = shadows and not rough and not certify
         own = find_own_frames(model.scene, model.large_closed, sights.cells, sights.plans) if wanted else []
         searches = tuple(FrameSearch.of(frame, device) for frame in own)

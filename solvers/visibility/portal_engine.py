@@ -5,6 +5,7 @@ from threading import Lock
 
 import numpy as np
 import warp as wp
+from embreex.rtcore_scene import EmbreeScene
 
 from ...data.blockers import Blockers
 from ...data.graph import CellGraph
@@ -32,6 +33,8 @@ from .shared import share_sightlines
 
 # With "auto" the occluders are asked about cells of whose potential objects more than this share is unknown.
 AUTO_UNKNOWN = 0.02
+# What takes no longer is prepared without being put off.
+AT_ONCE_S = 1.0
 LEAST_UNKNOWN = {"portals": np.inf, "both": 0.0, "auto": AUTO_UNKNOWN}
 
 
@@ -65,6 +68,7 @@ class PortalEngine:
         self._objects = len(model.scene.objects)
         tiles = graph.tiles
         self._sights = Sights.of(model, graph.cells, seed, device, graph.plans)
+        self._sights.targets.make()
         self._incidence = populate(model.scene, tiles.cells, partial(launch_clip, device=device))
         blockers = model.walls if certify else model.blockers(tiles)
         self.model = CellModel(tiles, blockers, self._sights, seed, device)
@@ -85,9 +89,31 @@ class PortalEngine:
                     self._occluders = OccluderModel.of(self._sights, certify=self._certify)
             return self._occluders
 
-    def prepare(self, seconds: float = np.inf) -> bool:
-        """As of `Engine`: all is made; occluders are made when they are first asked."""
+    @property
+    def opaque(self) -> EmbreeScene | None:
+        """As of `Engine`."""
+        return self._sights.targets.opaque
+
+    def begin(self, seconds: float = np.inf) -> bool:
+        """As of `Engine`: of occluders; portals are made."""
+        return self._hides_alone or self._sights.model.make_plainest(seconds)
+
+    def look(self, seconds: float = np.inf) -> bool:
+        """As of `Engine`: all is made."""
         return True
+
+    def prepare(self, seconds: float = np.inf) -> bool:
+        """As of `Engine`; without a limit occluders are made when they are first asked."""
+        if seconds < np.inf and not self._hides_alone:
+            if not (self._sights.model.whole and self._sights.model.make_curtains(max(seconds, AT_ONCE_S))):
+                return False
+            _ = self.occluders
+        return True
+
+    @property
+    def _hides_alone(self) -> bool:
+        """Whether portals hide, and occluders do not, or as certificates want it."""
+        return self._certify or self._least_unknown == np.inf
 
     def compile(self) -> None:
         """As of `Engine`."""
@@ -147,12 +173,11 @@ class PortalEngine:
 
     def coarse_steps(self) -> int:
         """As of `Engine`; certificates speak of single cells, and portals alone hide by nothing else."""
-        alone = self._certify or self._least_unknown == np.inf
-        if alone:
+        if self._hides_alone:
             return 0
-        steps = steps_below(self.occluders)
-        self._rough = OccluderModel.of(self._sights, rough=True)
-        return 1 + len(steps)
+        bare = not self._sights.model.whole
+        self._rough = OccluderModel.of(self._sights, rough=True, bare=bare)
+        return 1 + len(steps_below(self._rough))
 
     def coarse(self, cells: np.ndarray, group: np.ndarray) -> Rows:
         """As of `Engine`."""
@@ -160,12 +185,13 @@ class PortalEngine:
 
     def narrow(self, rows: Rows, step: int) -> Rows:
         """As of `Engine`."""
-        return narrowed(self._rough, self.occluders, rows, step)
+        return narrowed(self._rough, self._occluders or self._rough, rows, step)
 
-    def unknown(self, block: np.ndarray) -> Part:
+    def unknown(self, block: np.ndarray, objects: Rows | None = None) -> Part:
         """As of `Engine`."""
         count = self.model.graph.cell_count
-        return Part(unknown_rows(block[block < count], count), unknown_rows(block, self._objects))
+        rows = unknown_rows(block, self._objects) if objects is None else objects
+        return Part(unknown_rows(block[block < count], count), rows)
 
     def join(self, parts: list[Part], *, share: bool = True) -> tuple[Rows, Rows]:
         """As of `Engine`; cells are made symmetric: A sees B exactly when B sees A."""

@@ -2,10 +2,11 @@
 
 from copy import copy
 from dataclasses import replace
-from threading import Lock
+from threading import RLock
 
 import numpy as np
 import warp as wp
+from embreex.rtcore_scene import EmbreeScene
 
 from ...data.blockers import Blockers
 from ...data.graph import CellGraph
@@ -60,35 +61,68 @@ class ViewCellEngine:
         self._vlod = vlod if method == "vlod" and not certify else None
         self._objects = len(model.scene.objects)
         blockers = None if portal_graph is None or certify else model.blockers(portal_graph)
-        sights = Sights.of(model, cells, seed, device, plans)
+        self._sights = Sights.of(model, cells, seed, device, plans)
         self._options = {"blockers": blockers, "shadows": method != "portals" or certify, "certify": certify}
         # What stands at an angle takes most of the time of a large model, and is made when it is needed.
-        self._making, self._ready = Lock(), False
-        self.model = self._rough = OccluderModel.of(sights, **self._options, rough=True)
+        self._making, self._ready = RLock(), False
+        self._rough: OccluderModel | None = None
+        self._complete: OccluderModel | None = None
+
+    @property
+    def model(self) -> OccluderModel:
+        """All that hides, as far as it is made."""
+        self.begin()
+        return self._complete or self._rough
+
+    @model.setter
+    def model(self, model: OccluderModel) -> None:
+        self._complete = model
 
     @property
     def proof_occluders(self) -> tuple[Blockers, Regions, Patches]:
         """As of `Engine`."""
-        return self._prepared.walls, self._prepared.regions, self._prepared.patches
+        model = self._prepared
+        # Where they were not made nothing was hidden, and no certificate names them.
+        return model.walls if self._ready else model.regions.blockers, model.regions, model.patches
 
     def from_cells(self, cells: np.ndarray) -> "ViewCellEngine":
         """The same engine for other view cells [grid steps], shape (n, 2, 3), int32."""
         other = copy(self)
         other.model = self.model.from_cells(cells)
+        other._sights = other.model.sights
         other._rough = replace(self._rough, sights=other.model.sights, frames=())
         return other
+
+    @property
+    def opaque(self) -> EmbreeScene | None:
+        """As of `Engine`."""
+        return self._sights.targets.opaque
+
+    def begin(self, seconds: float = np.inf) -> bool:
+        """As of `Engine`, by one thread for all."""
+        with self._making:
+            if self._rough is None:
+                whole = self._certify or self._prepared.make_plainest(seconds)
+                self._rough = OccluderModel.of(self._sights, **self._options, rough=True, bare=not whole)
+            return self._prepared.whole
+
+    def look(self, seconds: float = np.inf) -> bool:
+        """As of `Engine`."""
+        return self._sights.targets.make(seconds)
 
     def prepare(self, seconds: float = np.inf) -> bool:
         """As of `Engine`, by one thread for all."""
         with self._making:
-            if not self._ready and (not self._options["shadows"] or self._prepared.make_curtains(seconds)):
-                self.model, self._ready = OccluderModel.of(self.model.sights, **self._options), True
+            if self._ready or not (self.begin() and self.look(seconds)):
+                return self._ready
+            if not self._options["shadows"] or self._prepared.make_curtains(seconds):
+                self.model, self._ready = OccluderModel.of(self._sights, **self._options), True
             return self._ready
 
     def compile(self) -> None:
         """As of `Engine`."""
         for module in (target, shaft, sightline, aim, *([line_tree] if self._certify else [])):
-            wp.load_module(module.__name__, device=self.model.sights.device.name)
+            wp.load_module(module.__name__, device=self._sights.device.name)
 
     def visible(self, block: np.ndarray, *, aim: bool = True) -> Part:
         """As of `Engine`."""
@@ -110,7 +144,7 @@ class ViewCellEngine:
 
     def glance(self, block: np.ndarray, number: int) -> Rows:
         """As of `Engine`."""
-        return glance(self.model.sights, block, number)
+        return glance(self._sights, block, number)
 
     def coarse_steps(self) -> int:
         """As of `Engine`; certificates speak of single cells, and vLOD's method hides by nothing else."""
@@ -125,13 +159,13 @@ class ViewCellEngine:
         """As of `Engine`."""
         return narrowed(self._rough, self.model, rows, step)
 
-    def unknown(self, block: np.ndarray) -> Part:
+    def unknown(self, block: np.ndarray, objects: Rows | None = None) -> Part:
         """As of `Engine`."""
-        return Part(None, unknown_rows(block, self._objects))
+        return Part(None, unknown_rows(block, self._objects) if objects is None else objects)
 
     def join(self, parts: list[Part], *, share: bool = True) -> tuple[None, Rows]:
         """As of `Engine`; nothing is claimed of cells."""
         objects = join_objects(parts)
         if share:
-            share_sightlines(self.model.sights, objects)
+            share_sightlines(self._sights, objects)
         return None, objects

@@ -1,5 +1,6 @@
 """Time that passes only where a test wants it to."""
 
+from viewcell.data import patience, prepared, regions
 from viewcell.solvers.visibility.portal_engine import PortalEngine
 from viewcell.workbench.bake import blocks, budget, coarse, run
 
@@ -28,3 +29,16 @@ class Clock:
     def wait(self, seconds):
         """Let so much pass."""
         self.now += seconds
+
+
+def lots_take(monkeypatch, seconds):
+    """Where preparing looks time passes only while a lot of planes is worked on, so many seconds each."""
+    now, work = [0.0], regions._parts
+
+    def timed(*args):
+        now[0] += seconds
+        return work(*args)
+
+    monkeypatch.setattr(regions, "_parts", timed)
+    for module in (patience, prepared):
+        monkeypatch.setattr(module, "time", type("stopped", (), {"perf_counter": lambda: now[0]}))

@@ -129,3 +129,18 @@ def test_pieces_of_a_model_hold_all_but_covered_faces():
     # What is not touched is cut as it was.
     a, b = (some.pieces[some.starts[2] : some.starts[3]] for some in (found, plain))
     assert np.array_equal(a, b)
+
+
+def test_copies_of_a_wall_have_its_faces_where_they_stand():
+    """Two pairs of walls end to end, the second pair a copy of the first one elsewhere."""
+    shift = np.array([9000, -4000])
+    walls = [wall(A, B), wall(B, C), wall(A + shift, B + shift), wall(B + shift, C + shift)]
+    model = PreparedModel(random_solids.scene_of_meshes(walls))
+    models = model.scene.first_alike
+    assert models.tolist() == [0, 1, 0, 1]
+    own, copied = exposed_faces(model.closed), exposed_faces(model.closed, models)
+    assert list(own) == list(copied) == [0, 1, 2, 3]
+    for one, other in zip(own.values(), copied.values(), strict=True):
+        for face, same in zip(one, other, strict=True):
+            np.testing.assert_array_equal(face.ends, same.ends)
+            np.testing.assert_array_equal(face.corners, same.corners)

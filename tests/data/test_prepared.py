@@ -1,5 +1,6 @@
 """A model prepared once: each part is made once, from the right triangles, and names what it is made of."""
 
+from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
 
@@ -7,7 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 from builders import random_solids, small_house
-from viewcell.data import prepared
+from builders.clocks import lots_take
+from viewcell.data import prepared, rasters
 from viewcell.data.buildings.arcade import ARCH_M, BAY_M, SPRING_M, make_arcade
 from viewcell.data.buildings.shell import OUTER_WALL_M
 from viewcell.data.patches import find_patches
@@ -172,3 +174,49 @@ def test_curtains_that_take_too_long_are_not_made():
     made = model.curtains
     assert len(made.boxes) > 0 and made is model.curtains
     assert made.boxes.tolist() == PreparedModel(model.scene).curtains.boxes.tolist()
+
+
+def test_without_time_objects_are_whole_and_nothing_hides():
+    model = PreparedModel(random_solids.random_solids(1))
+    assert not model.make_plainest(-1.0) and not model.whole
+    assert len(model.regions.boxes) == 0
+    np.testing.assert_array_equal(model.occludees.pieces, model.occludees.bounds)
+    assert model.occludees.starts.tolist() == list(range(len(model.scene.objects) + 1))
+    assert not model.make_plainest(1e6), "what was left out stays so: others have used it"
+
+
+def test_with_time_nothing_is_left_out():
+    model, plain = (PreparedModel(random_solids.random_solids(1)) for _ in range(2))
+    assert model.make_plainest(1e6) and model.whole
+    for name in ("boxes", "region", "open_before", "plane"):
+        np.testing.assert_array_equal(getattr(model.regions, name), getattr(plain.regions, name))
+    np.testing.assert_array_equal(model.occludees.pieces, plain.occludees.pieces)
+
+
+@pytest.mark.parametrize("times", [1, 3])
+def test_some_regions_are_sound_occluders_too(monkeypatch, times):
+    """As many lots of planes as there was time for, from all over the model."""
+    monkeypatch.setattr(rasters, "LOT", 16)
+    whole = PreparedModel(random_solids.random_solids(1)).regions
+    lots_take(monkeypatch, 1.0)
+    model = PreparedModel(random_solids.random_solids(1))
+    assert not model.make_plainest(times)
+    found, every = ({(*box, int(axis)) for box, axis in zip(boxes, axes, strict=True)} for boxes, axes in (
+        (part.boxes.reshape(-1, 6).tolist(), part.blockers.axis) for part in (model.regions, whole)
+    ))  # fmt: skip
+    assert 0 < len(found) < len(every) and found < every
+    places = model.regions.places
+    assert places[-1].tolist() == [len(model.regions.u), len(model.regions.v), len(model.regions.open_before)]
+
+
+def test_pieces_take_a_third_of_the_time(monkeypatch):
+    told = []
+
+    @contextmanager
+    def within(seconds):
+        told.append(seconds)
+        yield
+
+    monkeypatch.setattr(prepared, "within", within)
+    assert PreparedModel(random_solids.random_solids(1)).make_plainest(60.0)
+    assert told[0] == 20.0 and 20.0 < told[1] <= 60.0

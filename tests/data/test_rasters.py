@@ -49,6 +49,32 @@ def test_tiles_hold_every_cell_once_and_largest_ones_cannot_grow(seed):
             assert not any(part.size and part.all() for part in beside)
 
 
+def test_rasters_of_the_same_cells_in_a_row_are_alike_only_if_rows_are_as_long():
+    """Two tables of 24 nodes, 4 by 6 and 6 by 4, true at the same nodes."""
+    lines = [[(np.zeros(n, int), np.arange(n)), (np.ones(10 - n, int), np.arange(10 - n))] for n in (4, 6)]
+    rasters, mask = Rasters.of(lines, 2), np.zeros(48, bool)
+    for node in (0, 1, 2, 6):
+        mask[[node, 24 + node]] = True
+    known = {}
+    owner, rectangles = rasters.maximal(mask, mask, known)
+    wide, tall = ([[0, 0], [1, 3]], [[0, 0], [2, 1]]), ([[0, 0], [1, 3]], [[0, 2], [2, 3]])
+    for k, wanted in enumerate((wide, tall)):
+        assert sorted(rectangles[owner == k].tolist()) == sorted(wanted)
+    assert len(known) == 2
+
+
+@given(st.integers(0, 2**32))
+def test_rectangles_that_are_known_are_those_that_are_found(seed):
+    """Of rasters with the same cells, of which as much is wanted or less."""
+    rng = np.random.default_rng(seed)
+    rasters, flat, _, _ = random_rasters(rng)
+    some = flat & (rng.random(len(flat)) < 0.3)
+    known = {}
+    for wanted in (flat.copy(), some, flat.copy()):
+        alone = [found.tolist() for found in rasters.maximal(flat, wanted)]
+        assert [found.tolist() for found in rasters.maximal(flat, wanted, known)] == alone
+
+
 @given(st.integers(0, 2**32))
 def test_sums_runs_and_marks_are_those_of_each_raster(seed):
     rng = np.random.default_rng(seed)

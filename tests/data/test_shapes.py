@@ -1,7 +1,7 @@
 """Which objects are alike: only a shift may be between them."""
 
 import numpy as np
-from viewcell.data.shapes import copies, first_alike, mostly_copies, shape_key, shared_corners
+from viewcell.data.shapes import copies, extents, first_alike, mostly_copies, shape_key, shared_corners
 
 WEDGE = np.array([[[0, 0, 0], [7, 0, 0], [0, 5, 0]], [[0, 0, 0], [0, 5, 0], [0, 0, 3]]], np.int32)
 
@@ -45,3 +45,9 @@ def test_shared_corners_are_those_of_every_triangle():
     points, places = shared_corners(triangles, starts, own)
     assert (points[places] == triangles).all()
     assert list(copies(np.zeros(3, int), np.arange(2))) == [] and not mostly_copies(np.zeros(1, int), own[:0])
+
+
+def test_extents_are_sides_of_boxes():
+    triangles = np.random.default_rng(1).integers(-(2**24), 2**24, (50, 3, 3)).astype(np.int32)
+    np.testing.assert_array_equal(extents(triangles), np.ptp(triangles.astype(np.int64), axis=1))
+    assert extents(triangles[:0]).shape == (0, 3)

@@ -5,6 +5,7 @@ import pytest
 import trimesh
 from builders import random_solids
 from viewcell.data.errors import InputError
+from viewcell.data.patience import OutOfTime, within
 from viewcell.data.prepared import PreparedModel
 from viewcell.data.scene import Mesh, Space
 from viewcell.data.walkways import REACH_M, walkway_cells
@@ -94,3 +95,10 @@ def test_too_many_cells_are_refused(monkeypatch):
     monkeypatch.setattr("viewcell.data.walkways.CELLS_MOST", 10)
     with pytest.raises(InputError, match="expected at most 10 cells, found"):
         walkway_cells(model_of(SLAB))
+
+
+def test_floors_are_looked_at_while_there_is_time():
+    model = model_of(SLAB)
+    assert len(walkway_cells(model))
+    with within(0.0), pytest.raises(OutOfTime):
+        walkway_cells(model)

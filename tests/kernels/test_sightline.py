@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from builders import random_buildings
+from viewcell.data.shapes import mostly_copies
 from viewcell.kernels.sightline import device_triangles, launch_confirm
 from viewcell.verify.exact.sightline import Sight, Sightlines
 
@@ -39,6 +40,20 @@ def test_confirmed_is_never_wrong(seed):
         # An end that lies on a triangle is clear in the exact test, whose segments are open, and blocked here.
         assert not (got & ~truth).any(), "confirmed, but a triangle is in the way"
         assert truth.sum() > 100 and (got & truth).sum() > (0.5 if near else 0.999) * truth.sum()
+
+
+def test_triangles_of_copies_are_those_of_each():
+    """400 objects of each of three shapes, one of which has no triangles."""
+    rng = np.random.default_rng(0)
+    sizes, models = np.tile([7, 0, 5], 400), np.tile([0, 1, 2], 400)
+    shapes = [rng.integers(-50, 50, (size, 3, 3)) for size in (7, 0, 5)]
+    shifts = rng.integers(-5000, 5000, (len(sizes), 3))
+    triangles = np.concatenate([shapes[k] + shift for k, shift in zip(models, shifts, strict=True)]).astype(np.int32)
+    owners = np.repeat(np.arange(len(sizes)), sizes)
+    assert mostly_copies(np.append(0, np.cumsum(sizes)), models)
+    once, each = device_triangles(triangles, owners, models=models), device_triangles(triangles, owners)
+    for name in ("a", "b", "c", "owner", "opaque", "running_area"):
+        np.testing.assert_array_equal(getattr(once, name).numpy(), getattr(each, name).numpy())
 
 
 def skimming(triangles, rng, count):

@@ -7,6 +7,7 @@ keeps find more than even ones: on the default office 8 rounds, 1,139 rays an ey
 from dataclasses import dataclass
 
 import numpy as np
+from embreex.rtcore_scene import EmbreeScene
 
 from ...data.graph import CellGraph
 from ...data.kept import cell_volumes
@@ -66,6 +67,7 @@ def kept_by_eye(
     graph: CellGraph,
     pairs: tuple[np.ndarray, np.ndarray],
     seed: int = 0,
+    opaque: EmbreeScene | None = None,
 ) -> EyeSample | None:
     """Kept objects over those that random eyes see, for at most 32 view cells, drawn by volume.
 
@@ -79,13 +81,14 @@ def kept_by_eye(
         graph: cells; the inhabitable ones are measured.
         pairs: cell and object of each potential pair, shape (n,) each, int.
         seed: of cells, eyes and rays.
+        opaque: all opaque triangles in Embree, in the model's order, if somebody has them there.
 
     Returns:
         The ratios; None where no cell keeps anything, or has a free point. The same for the same arguments.
     """
     rng = np.random.default_rng(seed)
     cells, weights = _drawn_cells(graph, rng)
-    sight = Sight(scene)
+    sight = Sight(scene, opaque)
     index = SolidIndex(graph.cells[cells], solids)
     source, target = pairs
     wanted = np.isin(source, cells)
@@ -145,13 +148,12 @@ def draw_eyes(
 class Sight:
     """Rays through a model, from eyes to objects."""
 
-    def __init__(self, scene: Scene) -> None:
-        """Build Embree's scenes."""
-        opaque, self._owners = scene.triangles(*OPAQUE)
+    def __init__(self, scene: Scene, opaque: EmbreeScene | None = None) -> None:
+        """Build Embree's scenes, of opaque triangles unless they are given."""
+        triangles, self._owners = scene.triangles(*OPAQUE)
         glass, self._glass_owners = scene.triangles(Role.TRANSPARENT)
-        self._opaque, self._glass = embree_scene(opaque), embree_scene(glass)
-        self._corners, owners = scene.triangles()
-        self._starts = np.searchsorted(owners, np.arange(len(scene.objects) + 1))
+        self._opaque, self._glass = opaque or embree_scene(triangles), embree_scene(glass)
+        self._corners, self._starts = scene.triangles()[0], scene.triangle_starts
         self._clear = scene.object_mask(Role.TRANSPARENT)
         edges = (self._corners[:, 1:] - self._corners[:, :1]).astype(np.float64)
         # A little more than nothing, so that every object has somewhere to be aimed at.

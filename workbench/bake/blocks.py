@@ -69,7 +69,7 @@ class Shortfall:
     """What a deadline left undone.
 
     Attributes:
-        phase: what was being done: "hiding", "witnesses" or "octree".
+        phase: what was being done: "preparing", "hiding", "witnesses" or "octree".
         cells: view cells that are not finished.
         pairs: pairs without a verdict from them: unknown, never hidden.
         needed_s: about how long visibility takes as a whole, from what was measured; None if nothing was.

@@ -1,6 +1,7 @@
 """A bake within a budget: something sound for every view cell first, then what tells most per second.
 
-First what is seen at a glance. Then small pieces of the first blocks tell how long a bake takes: where there is time
+Preparing comes first, by half of the budget at most: what hides then is as much as was made. Where that was all, first
+what is seen at a glance. Then small pieces of the first blocks tell how long a bake takes: where there is time
 for all of it, that is done. Where there is none even to hide from all, occluders hide from every view cell, coarsely at
 first (workbench/bake/coarse.py). What time is left hides as a bake does, then finds witnesses.
 Everything that is not proved hidden by then is kept, and is unknown where it was not seen.
@@ -16,7 +17,7 @@ from .blocks import Rate, Shortfall, Work
 from .coarse import Coarse
 
 if TYPE_CHECKING:
-    from ...solvers.visibility.engine import Part
+    from ...solvers.visibility.engine import Engine, Part
 
 # Looks around from every view cell before anything else: share of the time at most, number at most, and the share by
 # which a look has to add to what is seen for there to be another.
@@ -27,8 +28,16 @@ GUESSED = 2.0
 HOPE = 4.0
 # View cells of the first blocks that tell how long others take.
 PROBE = 4
-# Share of what time is left that preparing to hide as a bake does may take.
-PREPARING = 0.25
+# Share of what time is left that preparing to hide as a bake does may take, and preparing for glances; and share of all
+# that preparing what hides coarsely may take.
+PREPARING, COARSELY = 0.25, 0.5
+
+
+def prepare_within(engine: "Engine", seconds: float) -> None:
+    """Make what an engine hides by and glances need, as much as a budget of so many seconds leaves time for."""
+    started = time.perf_counter()
+    engine.begin(COARSELY * seconds)
+    engine.look(PREPARING * (started + seconds - time.perf_counter()))
 
 
 def within_budget(
@@ -42,7 +51,7 @@ def within_budget(
         boxes: of all cells [grid steps], shape (cells, 2, 3), int32.
         volumes: of all cells, shape (cells,), float64.
     """
-    glances, done = _glance(work, blocks), {}
+    glances, done = _glance(work, blocks) if work.engine.look(0.0) else Rows.join([]), {}
     for number, block in enumerate(blocks):
         part = work.store.load(number)
         if part is not None:
@@ -52,11 +61,11 @@ def within_budget(
     left = _pieces([(number, block) for number, block in enumerate(blocks) if number not in stored], work.width)
     coarse = Coarse(work, glances, np.concatenate([np.zeros(0, int), *(cells for _, cells in left)]), boxes, volumes)
     full, begun = Rate(), 0.0
-    ready = work.engine.prepare(0.0)
+    ready = work.engine.begin() and work.engine.prepare(0.0)
     if left and hiding.fits(1, work.deadline):
         coarse.begin()
         begun = time.perf_counter() - work.started
-        if coarse.first() and not ready:
+        if coarse.first() and not ready and work.engine.begin():
             ready = work.engine.prepare(PREPARING * (work.deadline - time.perf_counter()))
         if ready:
             left = _finish_directly(work, blocks, left, (hiding, full), done)
@@ -73,8 +82,8 @@ def within_budget(
     some = cells[: hiding.room(work.deadline)]
     rest = _hide(work, hiding, [some[k :: work.width] for k in range(min(work.width, len(some)))])
     for number, cells in left:
-        part = work.engine.unknown(np.setdiff1d(cells, some))
-        part.objects = coarse.left(part.objects)
+        alone = np.setdiff1d(cells, some)
+        part = work.engine.unknown(alone, coarse.left(alone))
         done.setdefault(number, []).append(part)
     raw = {number for number, _ in left}
     rough = sorted(set(done) - stored - raw, key=lambda number: (-_unknown(done[number]), number))
@@ -93,7 +102,8 @@ def within_budget(
         small = PROBE * work.width
         needed = begun + small * hiding.each + (small + count) * full.each
     pairs = sum(_unknown(done[number]) for number in unfinished) + _unknown(rest)
-    return parts, Shortfall("hiding" if raw else "witnesses", count, pairs, needed, full.minute(count))
+    phase = "witnesses" if not raw else "hiding" if ready else "preparing"
+    return parts, Shortfall(phase, count, pairs, needed, full.minute(count))
 
 
 def _finish(

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...data.hierarchy import leaves_of
 from ...data.rows import Rows
+from ...solvers.visibility.engine import unknown_rows
 from .blocks import Rate, Work
 
 # Share of the time left that each of the first steps may take; cells or groups that a thread does at a time, and those
@@ -59,11 +60,12 @@ class Coarse:
         """Hide as much as there is time for, step by step; steps have to be faster than hiding as a bake does."""
         self._run(self.steps, hiding, all_of_it=False)
 
-    def left(self, rows: Rows) -> Rows:
-        """Those of some rows that are not hidden."""
+    def left(self, cells: np.ndarray) -> Rows:
+        """Every object that is not hidden from some cells, ordered as these are."""
         if self.kept is None:
-            return rows
-        return rows.take(self.kept[self._places[rows.source], rows.target])
+            return unknown_rows(cells, self.work.objects)
+        place, target = np.nonzero(self.kept[self._places[cells]])
+        return Rows.unseen(cells[place], target)
 
     @cached_property
     def _places(self) -> np.ndarray:

@@ -28,7 +28,7 @@ from ...solvers.levels.pixel_error import pixel_levels
 from ..baked import Bake
 from . import blocks
 from .blocks import Shortfall, Store, Work, in_blocks, refine
-from .budget import within_budget
+from .budget import prepare_within, within_budget
 from .cells import Sources, bare_sources, model_sources
 from .manifest import Clock, bake_manifest, fingerprint, rewrite_manifest
 from .place import alone, check_place, default_out, occupied, partial_folder, set_aside
@@ -201,7 +201,7 @@ def _detailed(scene: Scene, settings: Settings, run: _Run) -> tuple[Scene, dict]
 
 def _write(sources: Sources, scene: Scene | None, settings: Settings, run: _Run, tuned: dict[str, dict]) -> Bake:
     """Compute visibility of the model as it is, and all that follows from it, and write the folder."""
-    cell_rows, object_rows, extra, short = _visibility(sources, settings, run)
+    cell_rows, object_rows, extra, short, engine = _visibility(sources, settings, run)
     graph, facts, clock = sources.graph, sources.facts, run.clock
     if scene is not None and len(ids := moving(scene)):
         object_rows = with_moving(object_rows, sources.model.scene, ids, graph.cells, graph.inhabitable)
@@ -213,7 +213,7 @@ def _write(sources: Sources, scene: Scene | None, settings: Settings, run: _Run,
         extra |= _leaks(sources, (cell_rows, object_rows), settings, run)
         clock.lap("leaks")
     clock.show("eyes, back faces")
-    facts |= _worth(sources, object_rows, settings.seed, run.device, back_faces=short is None)
+    facts |= _worth(sources, object_rows, settings.seed, engine, run.device, finished=short is None)
     clock.lap("eyes, back faces")
     if scene is not None and settings.lods:
         extra["cell_lods"] = _cell_lods(sources.model.scene, graph, object_rows, settings)
@@ -278,8 +278,10 @@ def engine_of(sources: Sources, settings: Settings, device: "Device") -> "Engine
 
 def _visibility(
     sources: Sources, settings: Settings, run: _Run
-) -> tuple[Rows | None, Rows, dict[str, pa.Table], Shortfall | None]:
+) -> "tuple[Rows | None, Rows, dict[str, pa.Table], Shortfall | None, Engine]":
     """Visibility of all inhabitable cells, certificate tables, and what the budget left of it, if it ended early.
+
+    And the engine.
 
     Cells of an octree are refined on the way: `sources` has them all then.
     """
@@ -289,6 +291,8 @@ def _visibility(
     engine = engine_of(sources, settings, run.device)
     if run.budget_s is None:
         engine.prepare()
+    else:
+        prepare_within(engine, run.budget_s - (time.perf_counter() - started))
     clock.lap("prepare")
     compiled = time.perf_counter()
     clock.show("compile")
@@ -316,16 +320,18 @@ def _visibility(
         sources.facts["certificate_s"] = round(proofs.seconds, 3)
         clock.lap("certificates")
     # Where time ran out, most is unknown, and sharing would take as long again.
-    return *work.engine.join(parts, share=short is None), tables, short
+    return *work.engine.join(parts, share=short is None), tables, short, work.engine
 
 
-def _worth(sources: Sources, rows: Rows, seed: int, device: "Device", back_faces: bool) -> dict:
+def _worth(sources: Sources, rows: Rows, seed: int, engine: "Engine", device: "Device", *, finished: bool) -> dict:
     """What the manifest says of a bake's worth, and its counts, with triangles: side by side, as each is one thread."""
     from ...kernels.launch import side_by_side
 
     graph, facts, model = sources.graph, sources.facts, sources.model
-    work = [lambda: worth(model, graph, (rows.source, rows.target), facts, seed)]
-    if model is not None and back_faces:
+    # What a budget left no time for in preparing it leaves none for here.
+    sight = {"eyes": finished or engine.look(0.0), "opaque": engine.opaque}
+    work = [lambda: worth(model, graph, (rows.source, rows.target), facts, seed, **sight)]
+    if model is not None and finished:
         work.append(lambda: {"counts": facts["counts"] | _triangle_counts(model, graph, rows, device)})
     found = {}
     for _, part in sorted(side_by_side(lambda do: do(), work, device)):

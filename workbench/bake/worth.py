@@ -13,6 +13,8 @@ from ...data.prepared import PreparedModel
 from ...data.room_cells import room_covers
 
 if TYPE_CHECKING:
+    from embreex.rtcore_scene import EmbreeScene
+
     from ...data.store.bake_folder import BakeFolder
 
 # A bake that keeps a larger share of the model than this on average says so.
@@ -23,6 +25,7 @@ CRACK_M = 0.05
 ROOMS_NAMED, LEAK_NAMED = 5, 12
 LOOK = "viewcell inspect MODEL --picture plan.png"
 PHASES = {
+    "preparing": "while all that hides was prepared",
     "hiding": "before all that is hidden was found",
     "witnesses": "while witnesses were sought",
     "octree": "while the octree was refined",
@@ -30,7 +33,14 @@ PHASES = {
 
 
 def worth(
-    model: PreparedModel | None, graph: CellGraph, pairs: tuple[np.ndarray, np.ndarray], facts: dict, seed: int = 0
+    model: PreparedModel | None,
+    graph: CellGraph,
+    pairs: tuple[np.ndarray, np.ndarray],
+    facts: dict,
+    seed: int = 0,
+    *,
+    eyes: bool = True,
+    opaque: "EmbreeScene | None" = None,
 ) -> dict:
     """What the manifest says of a bake's worth: `kept`, `uncovered_rooms` and all `warnings`.
 
@@ -40,12 +50,14 @@ def worth(
         pairs: cell and object of each potential pair, shape (n,) each, int.
         facts: what the manifest says so far; its warnings come first.
         seed: of eyes and rays.
+        eyes: whether to look from some, which takes long in a model of millions of triangles.
+        opaque: as of `kept_by_eye`.
     """
     found, warnings = {}, list(facts.get("warnings", []))
     leak, budget = facts.get("leak_cells") or [], facts.get("budget")
     leaky = rooms = 0
     if model is not None:
-        found["kept"] = kept_numbers(model, graph, pairs, seed)
+        found["kept"] = kept_numbers(model, graph, pairs, seed, eyes=eyes, opaque=opaque)
         spaces, uncovered = model.scene.spaces, _uncovered_rooms(model, graph, facts)
         found["uncovered_rooms"], rooms = [room["name"] for room in uncovered], len(spaces)
         if spaces and graph.portal_count:
@@ -66,7 +78,15 @@ def told_worth(bake: "BakeFolder") -> tuple[dict | None, list[str]]:
     return manifest.get("kept"), [str(text) for text in manifest.get("warnings", [])]
 
 
-def kept_numbers(model: PreparedModel, graph: CellGraph, pairs: tuple[np.ndarray, np.ndarray], seed: int = 0) -> dict:
+def kept_numbers(
+    model: PreparedModel,
+    graph: CellGraph,
+    pairs: tuple[np.ndarray, np.ndarray],
+    seed: int = 0,
+    *,
+    eyes: bool = True,
+    opaque: "EmbreeScene | None" = None,
+) -> dict:
     """Shares of objects and triangles kept, means by volume, and kept / eye, as JSON takes them.
 
     Args:
@@ -74,16 +94,19 @@ def kept_numbers(model: PreparedModel, graph: CellGraph, pairs: tuple[np.ndarray
         graph: its cells.
         pairs: cell and object of each potential pair, shape (n,) each, int.
         seed: of eyes and rays.
+        eyes: as of `worth`.
+        opaque: as of `kept_by_eye`.
 
     Returns:
-        objects and triangles, from 0 to 1; and eye, None where no eye finds a place: median and worst ratio of what a
-        cell keeps to what an eye in it sees, the worst cell, the number of cells measured, and of eyes in each.
+        objects and triangles, from 0 to 1; and eye, None where no eye finds a place, or none looks: median and worst
+        ratio of what a cell keeps to what an eye in it sees, the worst cell, the number of cells measured, and of eyes
+        in each.
     """
     from ...verify.rays.eyes import kept_by_eye
 
     shares = kept_shares(graph.cell_count, *pairs, model.scene.triangle_counts)
     objects, triangles = (round(mean_kept(graph, share), 6) for share in shares)
-    sample, eye = kept_by_eye(model.scene, model.closed, graph, pairs, seed), None
+    sample, eye = kept_by_eye(model.scene, model.closed, graph, pairs, seed, opaque) if eyes else None, None
     if sample is not None:
         ratio, cell = sample.ratios[sample.worst], int(sample.cells[sample.worst])
         eye = {"median": round(sample.median, 4), "worst": round(float(ratio), 4), "worst_cell": cell}

@@ -8,7 +8,7 @@ from viewcell.data.buildings.office import make_office
 from viewcell.data.errors import InputError
 from viewcell.data.patches import find_patches, join_outlines, rectangle_outlines
 from viewcell.data.prepared import PreparedModel
-from viewcell.data.regions import find_regions
+from viewcell.data.regions import find_regions, join_regions
 from viewcell.data.scene import OPAQUE
 from viewcell.data.solids import triangles_meet_boxes
 from viewcell.kernels.launch import Device
@@ -37,7 +37,7 @@ class Office:
         patches = find_patches(self.triangles, self.owners, least_area=0.2 * STEPS**2)
         # Without rectangles of furniture: few occluders, so that where a projection point lies matters.
         solids = ([corners for _, corners in model.closed_of(role)] for role in OPAQUE)
-        regions = find_regions(model.surfaces, *solids, scene.grid_m)
+        regions = join_regions(find_regions(model.surfaces, *solids, scene.grid_m))
         self.occluders = join_outlines(rectangle_outlines(regions.boxes), patches)
         self.parts, self.count = model.occludees.pieces, len(scene.objects)
         self.part_owners = model.occludees.owners

@@ -7,6 +7,7 @@ from builders.random_buildings import scene_of
 from viewcell.data.solids import closed_elements
 from viewcell.data.view_cells import as_graph
 from viewcell.verify.rays import eyes
+from viewcell.verify.rays.embree import embree_scene
 from viewcell.verify.rays.eyes import EyeSample, kept_by_eye
 
 M = 1024
@@ -101,3 +102,14 @@ def test_cells_are_drawn_by_volume():
 def test_the_median_is_by_volume_and_the_worst_is_the_highest():
     found = EyeSample(np.array([3, 5, 8]), np.array([9.0, 1.0, 2.0]), np.array([1.0, 5.0, 1.0]))
     assert found.median == 1.0 and found.worst == 0
+
+
+def test_triangles_that_somebody_has_in_embree_show_the_same(monkeypatch):
+    scene, graph = hall(), as_graph(np.array(HALVES))
+    pairs = tuple(np.indices((2, len(scene.objects))).reshape(2, -1))
+    own = kept_by_eye(scene, closed_elements(scene), graph, pairs)
+    theirs = embree_scene(scene.triangles()[0])
+    built = []
+    monkeypatch.setattr(eyes, "embree_scene", lambda triangles: built.append(len(triangles)) or None)
+    found = kept_by_eye(scene, closed_elements(scene), graph, pairs, opaque=theirs)
+    assert found.ratios.tolist() == own.ratios.tolist() and built == [0], "of glass alone"

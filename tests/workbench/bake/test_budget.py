@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 import viewcell
-from builders.clocks import Clock
+from builders.clocks import Clock, lots_take
+from viewcell.data import rasters
 from viewcell.data.buildings.office import make_office
 from viewcell.data.prepared import PreparedModel
+from viewcell.solvers.visibility.aim import Targets
 from viewcell.solvers.visibility.portal_engine import PortalEngine
 from viewcell.solvers.visibility.view_cell_engine import ViewCellEngine
 from viewcell.workbench.bake import budget
@@ -120,3 +122,56 @@ def test_the_first_pieces_are_small():
     pieces = budget._pieces(blocks, 2)
     assert [(number, len(cells)) for number, cells in pieces] == [(0, 4), (1, 4), (0, 20), (1, 20), (2, 3)]
     assert sorted(np.concatenate([cells for _, cells in pieces])) == list(range(51))
+
+
+TABLE = "min_x,min_y,min_z,max_x,max_y,max_z\n1,1,0.3,2,2,1.3\n3,2.5,0.4,4.5,3.5,1.6\n"
+
+
+@pytest.fixture
+def from_cells(office, tmp_path):
+    """Bakes the office from two view cells, by occluders."""
+    table = tmp_path / "cells.csv"
+    table.write_text(TABLE)
+    return lambda name, **run: viewcell.bake(office, tmp_path / name, method="occluders", cells=str(table), **run)
+
+
+@pytest.mark.parametrize("lots", [0, 60])
+def test_preparing_ends_early_and_every_set_is_sound(from_cells, monkeypatch, lots):
+    """With no regions nothing is culled; with some, some is."""
+    full = from_cells("full")
+    monkeypatch.setattr(rasters, "LOT", 64)
+    lots_take(monkeypatch, 50.0 / lots if lots else 200.0)
+    made = from_cells("short", budget_s=100.0)
+    assert made.manifest["budget"]["phase"] == "preparing" and made.manifest["budget_spent"]
+    assert "ended early, while all that hides was prepared" in made.manifest["warnings"][-1]
+    assert (kept(made) >= kept(full)).all() and made.verify(rays=100_000).ok
+    assert kept(made).all() == (lots == 0)
+
+
+def test_a_short_preparation_does_not_pass_for_a_bake(from_cells, monkeypatch):
+    """The same command with more time gives what it would have given at once."""
+    full = from_cells("full")
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            PreparedModel, "make_plainest", lambda model, seconds, make=PreparedModel.make_plainest: make(model, -1.0)
+        )
+        assert kept(from_cells("again", budget_s=100.0)).all()
+    made = from_cells("again")
+    assert not made.manifest["budget_spent"] and (kept(made) == kept(full)).all() and (seen(made) == seen(full)).all()
+
+
+def test_without_time_for_triangles_nothing_is_seen_and_much_is_hidden(from_cells, monkeypatch):
+    """What sightlines are tested against is left out where it takes too long: no eyes then, either."""
+    full = from_cells("full")
+    monkeypatch.setattr(Targets, "make", lambda targets, seconds=np.inf: False)
+    made = from_cells("short", budget_s=100.0)
+    assert made.manifest["budget"]["phase"] == "preparing" and made.manifest["kept"]["eye"] is None
+    assert not seen(made).any() and (kept(made) >= kept(full)).all() and not kept(made).all()
+
+
+def test_preparing_takes_half_of_a_budget_and_of_the_rest_a_quarter(monkeypatch):
+    told, clock = [], iter([0.0, 30.0])
+    monkeypatch.setattr(budget, "time", type("stopped", (), {"perf_counter": lambda: next(clock)}))
+    engine = type("engine", (), {"begin": told.append, "look": told.append})
+    budget.prepare_within(engine, 100.0)
+    assert told == [50.0, 17.5]

@@ -74,9 +74,9 @@ def test_a_budget_that_ends_early_is_told(office, tmp_path):
     kept, budget = facts["warnings"]
     assert kept.startswith("a view cell keeps 100 % of the objects") and "the budget ended early" in kept
     pairs = facts["counts"]["cell_pairs"] + facts["counts"]["object_pairs"]
-    assert f"before all that is hidden was found: {pairs:,} pairs of" in budget and "give it more" in budget
+    assert f"while all that hides was prepared: {pairs:,} pairs of" in budget and "give it more" in budget
     assert facts["budget"] | {"pairs": 0} == {
-        "budget_s": 1e-6, "phase": "hiding", "pairs": 0, "cells": facts["counts"]["inhabitable"], "needed_s": None,
+        "budget_s": 1e-6, "phase": "preparing", "pairs": 0, "cells": facts["counts"]["inhabitable"], "needed_s": None,
         "minute": None,
     }  # fmt: skip
 
