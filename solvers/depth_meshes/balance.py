@@ -93,7 +93,11 @@ class Balanced:
 
 
 class Balance:
-    """A model, ready for one view cell after another."""
+    """A model, ready for one view cell after another.
+
+    Attributes:
+        sides: parts what may be seen about a cull box that is given.
+    """
 
     def __init__(
         self, scene: Scene, budget: Budget, *, texels: int = TEXELS, error: float = 1.0, device: Device = CPU
@@ -103,7 +107,7 @@ class Balance:
         Raises:
             InputError: a number out of range.
         """
-        self._sides = FarSides(scene, texels=texels, error=error, device=device)
+        self.sides = FarSides(scene, texels=texels, error=error, device=device)
         self._budget, self._focal, self._grid_m = budget, texels / 2 - RIM, scene.grid_m
         self._bounds = scene.object_bounds()
         self._errors, self._starts = object_errors(scene)
@@ -123,7 +127,7 @@ class Balance:
         # As far as the boxes of objects are from the middle along the axes: so large, a box holds part of them.
         away = np.maximum(self._bounds[potential, 0] - middle, middle - self._bounds[potential, 1]).max(axis=1)
         largest = max(smallest, 2.0 * float(away.max(initial=0.0)))
-        always = np.isin(potential, self._sides.geometry(potential, cell, smallest))
+        always = np.isin(potential, self.sides.geometry(potential, cell, smallest))
         ends = np.where(always, 0.0, away)
         order = np.argsort(ends, kind="stable")
         # Just too small for each object in turn.
@@ -142,7 +146,7 @@ class Balance:
             error = pixels + self._budget.skin_weight * self._skin(reach, boxes[fitting])
             if error < best:
                 best, box = error, float(boxes[fitting])
-        side = self._sides.of(potential, cell, box)
+        side = self.sides.of(potential, cell, box)
         pixels = self._threshold(side.near, cell, self._budget.triangles - side.triangles)
         levels = self._levels(side.near, cell, pixels)
         far = int(self._counts(side.far, self._levels(side.far, cell, PIXELS_LEAST)).sum())

@@ -24,13 +24,14 @@ from .parallax import ROUNDING
 PIXELS = 2_000_000
 
 
-def depth_mesh(parallax: np.ndarray, shown: np.ndarray, error: float) -> DepthMesh:
+def depth_mesh(parallax: np.ndarray, shown: np.ndarray, error: float, *, most: int | None = None) -> DepthMesh:
     """Triangles that keep every texel within an error, as few as greedy insertion finds.
 
     Args:
         parallax: of each pixel [texels], shape (height, width), float64, finite, both sizes from 2 to 65,536.
         shown: whether it shows something, same shape, bool.
         error: texels that its parallax may be off by, > 0.
+        most: triangles at which to stop, whatever the error; None for none.
 
     Returns:
         A mesh; its own `error` is what was found, at most some 1e-6 of the largest parallax, or half a PARALLAX_STEP
@@ -52,7 +53,7 @@ def depth_mesh(parallax: np.ndarray, shown: np.ndarray, error: float) -> DepthMe
     nearest = ndimage.distance_transform_edt(~shown, return_distances=False, return_indices=True)
     heights = parallax[tuple(nearest)].astype(np.float32)
     # Vertices are rounded as they are stored.
-    found = Delatin(heights, max_error=max(error - PARALLAX_STEP / 2, error / 2))
+    found = Delatin(heights, max_error=max(error - PARALLAX_STEP / 2, error / 2), max_triangles=most)
     # The library counts rows from below.
     column, row = found.vertices[:, 0].astype(np.int64), len(heights) - 1 - found.vertices[:, 1].astype(np.int64)
     order = np.lexsort((column, row))

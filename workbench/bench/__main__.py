@@ -7,7 +7,7 @@ from importlib import import_module
 from ...data.errors import InputError
 from ..terminal import UNUSABLE, complain
 
-NAMES = ("eye", "falsify", "flood", "models", "occlusion", "occupancy", "papers", "scaling", "storage", "walk")
+NAMES = ("depth", "eye", "falsify", "flood", "models", "occlusion", "occupancy", "papers", "scaling", "storage", "walk")
 
 
 def main(arguments: list[str] | None = None) -> int:
