@@ -33,12 +33,6 @@ def contents(walk: WalkFolder) -> str:
     """
     kinds, kind = np.unique(walk.objects["kind"].to_pylist(), return_inverse=True)
     arrays = {"kinds": kind.astype(np.uint16), **_objects(walk), **_items(walk), **_sets(walk), **_cells(walk)}
-    places, parts, begin = {}, [], 0
-    for name, values in arrays.items():
-        data = np.ascontiguousarray(values).tobytes()
-        places[name] = [KINDS[str(values.dtype)], begin, values.size]
-        parts.append(data)
-        begin += len(data)
     head = {
         "names": walk.objects["name"].to_pylist(),
         "kinds": kinds.tolist(),
@@ -46,10 +40,27 @@ def contents(walk: WalkFolder) -> str:
         "claimsCells": walk.claims_cells,
         "bounds": _bounds(_boxes(walk.objects)),
     }
+    return script("viewcellData", head, arrays)
+
+
+def script(name: str, head: dict, arrays: dict[str, np.ndarray]) -> str:
+    """A script that hands a page some arrays, under a name that is global there: the same for the same arrays.
+
+    Args:
+        name: such as viewcellData.
+        head: what else it says.
+        arrays: by name, of the dtypes in KINDS.
+    """
+    places, parts, begin = {}, [], 0
+    for own, values in arrays.items():
+        data = np.ascontiguousarray(values).tobytes()
+        places[own] = [KINDS[str(values.dtype)], begin, values.size]
+        parts.append(data)
+        begin += len(data)
     # Without a time in it, the same bytes give the same text.
     packed = base64.b64encode(gzip.compress(b"".join(parts), compresslevel=9, mtime=0)).decode()
     text = json.dumps({"head": head, "arrays": places}, ensure_ascii=True, separators=(",", ":"))
-    return f'globalThis.viewcellData={text[:-1]},"packed":"{packed}"}};\n'
+    return f'globalThis.{name}={text[:-1]},"packed":"{packed}"}};\n'
 
 
 def _boxes(table: pa.Table) -> np.ndarray:

@@ -1,29 +1,15 @@
 """What the viewer is given is what the display database says, read here by other code."""
 
-import base64
-import gzip
-import json
-
 import numpy as np
 import pytest
+from builders.view_scripts import read_script
 from viewcell.data.scene import Role
 from viewcell.workbench.view.contents import contents
-
-DTYPES = {"u1": "u1", "u2": "<u2", "u4": "<u4", "i4": "<i4", "f4": "<f4"}
-
-
-def read(text):
-    data = json.loads(text.removeprefix("globalThis.viewcellData=").removesuffix(";\n"))
-    block = gzip.decompress(base64.b64decode(data["packed"]))
-    arrays = {}
-    for name, (kind, begin, count) in data["arrays"].items():
-        arrays[name] = np.frombuffer(block, DTYPES[kind], count, begin)
-    return data["head"], arrays
 
 
 @pytest.fixture(scope="module")
 def given(walk):
-    return read(contents(walk))
+    return read_script(contents(walk))
 
 
 def test_objects_and_cells_are_in_their_order(given, walk, office):
@@ -101,7 +87,7 @@ def test_colours_are_the_models(tmp_path):
     cells = tmp_path / "cells.csv"
     cells.write_text("min_x,min_y,min_z,max_x,max_y,max_z\n2,2,2,3,3,3\n")
     made = bake(Scene(definitions, objects, source="boxes"), tmp_path / "a.bake", method="occluders", cells=str(cells))
-    head, arrays = read(contents(pack(made)))
+    head, arrays = read_script(contents(pack(made)))
     found = dict(zip(head["names"], arrays["colours"].tolist(), strict=True))
     assert found == {"blue": 0x0000FFFF, "none": 0, "own": 0x010203FF}
     # View cells that stand anywhere claim nothing of cells.

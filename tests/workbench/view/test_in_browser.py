@@ -11,8 +11,11 @@ import time
 import numpy as np
 import pytest
 from builders.chromium import chromium
+from viewcell.data.buildings.office import make_office
 from viewcell.data.scene import OPAQUE
 from viewcell.verify.rays.embree import embree_scene
+from viewcell.workbench.bake.run import bake
+from viewcell.workbench.bake.settings import Settings
 from viewcell.workbench.view.run import view
 
 
@@ -235,6 +238,51 @@ def test_from_above_verdicts_have_colours(shown):
     shown.choose("outlines", True)
     assert (np.abs(shown.picture(0.0) - plain).max(axis=2) > 20).mean() > 0.001
     assert shown.complaints() == []
+
+
+@pytest.fixture(scope="module")
+def certified(built, tmp_path_factory):
+    out = tmp_path_factory.mktemp("certified") / "office.bake"
+    made = bake(make_office(floors=1, rooms_per_side=3), out, settings=Settings(certify=True), threads=1)
+    return view(made.folder, out.with_suffix(".view")).page.parent
+
+
+def test_why_something_is_seen_or_not(browser, certified):
+    """A click on what one sees: its sightline. From above on what is hidden: what the proof names. Esc ends it."""
+    shown = Shown(browser, (certified / "index.html").as_uri())
+    shown.choose("view", "inside")
+    shown.browser.find_element("id", "canvas").click()
+    shown.until("return !document.getElementById('why').hidden")
+    found = shown.run("return { ...viewer.inquiry.found, id: viewer.inquiry.asked.id, cell: viewer.cell }")
+    assert found["verdict"] == "seen" and "A sightline of" in found["text"] and found["clear"]["distance"] > 0
+    box, to = found["box"], found["line"]["to"]
+    assert all(box[k] - 0.01 <= to[k] <= box[k + 3] + 0.01 for k in range(3))
+    shown.run("viewer.choose('object', viewer.database.head.names.findIndex((_, id) =>"
+              "!viewer.database.isPotential(viewer.cell, id) && viewer.database.triangleCounts[id]))")  # fmt: skip
+    shown.until("return viewer.inquiry.found.verdict === 'hidden'")
+    assert shown.run("return viewer.inquiry.found.corners.length") >= 12
+    assert shown.run("return document.getElementById('why-text').textContent").startswith("Proved hidden: ")
+    # From elsewhere the answer is another one.
+    for cell in shown.run("return [...viewer.database.viewCells]"):
+        shown.choose("cell", cell)
+        shown.until("return viewer.inquiry.from === viewer.visitor.cell")
+        cells = shown.run("return [...viewer.database.reachOf(viewer.cell)].length")
+        assert shown.run("return viewer.inquiry.found.verdict") in ("seen", "unknown", "hidden") and cells
+    room = shown.run("return viewer.database.rooms()[0].cell")
+    shown.run("viewer.choose('room', arguments[0])", room)
+    shown.until("return viewer.inquiry.asked.kind === 'cell' && viewer.inquiry.from === viewer.cell")
+    shown.run("dispatchEvent(new KeyboardEvent('keydown', { code: 'Escape' }))")
+    shown.until("return document.getElementById('why').hidden && viewer.stage.marks.solid.length === 0")
+    assert shown.complaints() == []
+
+
+def test_reasons_that_cannot_be_read_are_said(browser, folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "v")
+    (tmp_path / "v" / "why.js").unlink()
+    shown = Shown(browser, (tmp_path / "v" / "index.html").as_uri())
+    shown.run("viewer.choose('object', 0)")
+    shown.until("return document.getElementById('note').textContent === "
+                "'No reason can be given: why.js cannot be read'")  # fmt: skip
 
 
 def test_through_a_server(browser, folder):

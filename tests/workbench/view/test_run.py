@@ -10,14 +10,14 @@ from viewcell.data.errors import InputError
 from viewcell.workbench.cli import main
 from viewcell.workbench.view import run
 
-FILES = ["data.js", "index.html", "viewer.js", "viewer.js.LEGAL.txt"]
+FILES = ["data.js", "index.html", "viewer.js", "viewer.js.LEGAL.txt", "why.js"]
 
 
 @pytest.fixture(autouse=True)
 def scripts(tmp_path_factory, monkeypatch):
     """Stand-ins for what npm brings."""
     built = tmp_path_factory.mktemp("build")
-    for name in FILES[2:]:
+    for name in FILES[2:4]:
         (built / name).write_text(f"{name} with three.js")
     monkeypatch.setattr(run, "BUILT", built)
 
@@ -25,7 +25,7 @@ def scripts(tmp_path_factory, monkeypatch):
 def test_a_bake_and_its_pack_give_the_same_view(office, walk, tmp_path):
     first, second = viewcell.view(office, tmp_path / "a"), viewcell.view(walk.folder, tmp_path / "b")
     assert sorted(file.name for file in (tmp_path / "a").iterdir()) == FILES
-    for name in FILES[:1] + FILES[2:]:
+    for name in (*FILES[:1], *FILES[2:]):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
     text = first.page.read_text()
     # Nothing is fetched from anywhere.

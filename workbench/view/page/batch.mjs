@@ -50,11 +50,16 @@ export class Batch {
     mesh.layers.set(layer);
     mesh.frustumCulled = false;
     mesh.sortObjects = clear;
-    return { mesh, copies };
+    return { mesh, copies, ids };
   }
 
   get meshes() {
     return this.parts.map((part) => part.mesh);
+  }
+
+  /** The object that a copy in one of the meshes is. */
+  idOf(mesh, copy) {
+    return this.parts.find((part) => part.mesh === mesh).ids[copy];
   }
 
   /** Show some objects, given as an array of 0 and 1, and no others. */

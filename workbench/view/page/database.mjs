@@ -53,6 +53,12 @@ export class Database {
     return this.sets.get(row);
   }
 
+  /** Whether an object may be visible from a cell. */
+  isPotential(cell, id) {
+    if (this.members?.cell !== cell) this.members = { cell, ids: new Set(this.setOf(cell)?.potential) };
+    return this.members.ids.has(id);
+  }
+
   /** What one may stand on in a cell: those of its potential objects. */
   groundOf(cell) {
     if (this.standing?.cell !== cell) {

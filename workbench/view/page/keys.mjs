@@ -4,14 +4,17 @@ import { HURRY, SPEED, TURN } from "./visitor.mjs";
 
 const STEEP = 1.4;
 const PER_PIXEL = 0.004;
+// A finger that moved less far has clicked [pixels].
+const STILL = 5;
 const WAYS = {
   KeyW: ["forward", 1], KeyS: ["forward", -1], KeyA: ["right", -1], KeyD: ["right", 1],
   ArrowUp: ["forward", 1], ArrowDown: ["forward", -1], ArrowLeft: ["turn", 1], ArrowRight: ["turn", -1],
 };
 
 export class Keys {
-  /** Listen to what is typed anywhere but into fields, and dragged on `canvas`; `asked(code)` hears of other keys. */
-  constructor(canvas, visitor, asked) {
+  /** Listen to what is typed anywhere but into fields, and dragged on `canvas`; `asked(code)` hears of other keys,
+   * `clicked(x, y)` of clicks and taps. */
+  constructor(canvas, visitor, asked, clicked) {
     this.visitor = visitor;
     this.down = new Set();
     addEventListener("keydown", (event) => {
@@ -25,15 +28,19 @@ export class Keys {
     addEventListener("blur", () => this.down.clear());
     // One finger looks, two walk.
     const held = new Map();
+    let moved = 0;
     canvas.addEventListener("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
       held.set(event.pointerId, [event.clientX, event.clientY]);
+      moved = held.size > 1 ? Infinity : 0;
     });
+    canvas.addEventListener("pointerup", (event) => moved < STILL && clicked(event.offsetX, event.offsetY));
     for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => held.delete(event.pointerId));
     canvas.addEventListener("pointermove", (event) => {
       const last = held.get(event.pointerId);
       if (!last) return;
       held.set(event.pointerId, [event.clientX, event.clientY]);
+      moved += Math.abs(event.clientX - last[0]) + Math.abs(event.clientY - last[1]);
       if (held.size > 1) visitor.walk(0.016, (event.clientY - last[1]) * -0.4, (event.clientX - last[0]) * 0.4, SPEED);
       else this.look(event.clientX - last[0], event.clientY - last[1]);
     });

@@ -2,6 +2,7 @@
 
 import { Database } from "./database.mjs";
 import { eyeSees } from "./eye.mjs";
+import { Inquiry } from "./inquiry.mjs";
 import { Keys } from "./keys.mjs";
 import { Panel } from "./panel.mjs";
 import { Stage } from "./stage.mjs";
@@ -24,7 +25,8 @@ class Viewer {
     this.panel = new Panel(database.rooms(), [low, high], (name, value) => this.choose(name, value));
     for (const [name, value] of Object.entries(this.chosen)) this.panel.set(name, value);
     this.choose("height", this.storeyTop());
-    this.keys = new Keys(this.canvas, this.visitor, (code) => this.pressed(code));
+    this.keys = new Keys(this.canvas, this.visitor, (code) => this.pressed(code), (x, y) => this.why(x, y));
+    this.inquiry = new Inquiry(database, this.stage, this.panel, () => (this.stale = true));
     this.canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
       this.stage.zoom(Math.exp(event.deltaY * 0.001));
@@ -61,12 +63,25 @@ class Viewer {
     if (code === "KeyV") this.choose("view", VIEWS[(VIEWS.indexOf(this.chosen.view) + 1) % 3]);
     if (code === "KeyM") this.choose("mode", MODES[(MODES.indexOf(this.chosen.mode) + 1) % 3]);
     if (code === "KeyO") this.choose("outlines", !this.chosen.outlines);
+    if (code === "KeyY") this.why(this.canvas.clientWidth / (this.chosen.view === "both" ? 4 : 2), this.canvas.clientHeight / 2);
+    if (code === "Escape") this.inquiry.ask(null);
     if (code === "KeyC") this.choose("verdicts", !this.chosen.verdicts);
+  }
+
+  /** Ask why one sees what is at a place of the picture; from above a second click on it asks for the room there. */
+  why(x, y) {
+    const found = this.stage.pick(x, y, this.chosen.view);
+    const { asked } = this.inquiry;
+    const again = found && asked?.kind === "object" && asked.id === found.id;
+    const room = again ? this.database.maze.cellAt([found.point[0], found.point[1], found.point[2] + 0.5]) : -1;
+    return this.inquiry.ask(found && (room >= 0 ? { kind: "cell", id: room } : { kind: "object", id: found.id }));
   }
 
   /** Take a choice: of the panel, a key, or a test. */
   choose(name, value) {
-    if (name === "cell") {
+    if (name === "object" || name === "room") {
+      this.inquiry.ask({ kind: name === "room" ? "cell" : name, id: value });
+    } else if (name === "cell") {
       this.visitor.goTo(value);
       this.choose("height", this.storeyTop());
     } else {
@@ -145,6 +160,7 @@ class Viewer {
       this.enter();
       this.stale = true;
     }
+    this.inquiry.enter(this.cell);
     const turned = `${this.visitor.yaw} ${this.visitor.pitch} ${JSON.stringify(this.stage.orbit)}`;
     if (this.stale || asked || before !== this.visitor.point.join() || turned !== this.turned) {
       const start = performance.now();

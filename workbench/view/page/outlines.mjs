@@ -28,10 +28,11 @@ export function portalBoxes(maze, portals) {
   });
 }
 
-/** Lines of a colour on a layer, none at first. */
+/** Lines of a colour on a layer, none at first; `through` all that is before them. */
 export class Lines {
-  constructor(colour, layer, planes = []) {
-    this.mesh = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: colour, clippingPlanes: planes }));
+  constructor(colour, layer, planes = [], through = false) {
+    const material = new LineBasicMaterial({ color: colour, clippingPlanes: planes, depthTest: !through, transparent: through });
+    this.mesh = new LineSegments(new BufferGeometry(), material);
     this.mesh.layers.set(layer);
     this.mesh.frustumCulled = false;
   }

@@ -3,7 +3,7 @@
 export class Panel {
   /** Fill the page's fields; `chosen` hears of what is changed. */
   constructor(rooms, storeys, chosen) {
-    this.fields = Object.fromEntries(["cell", "drawn", "triangles", "rate", "note"].map((id) => [id, document.getElementById(id)]));
+    this.fields = Object.fromEntries(["cell", "drawn", "triangles", "rate", "note", "why-what", "why-verdict", "why-text"].map((id) => [id, document.getElementById(id)]));
     const list = document.getElementById("rooms");
     list.replaceChildren(...rooms.map(({ name }) => Object.assign(document.createElement("option"), { value: name })));
     const room = document.getElementById("room");
@@ -23,6 +23,14 @@ export class Panel {
     }
     const [low, high] = storeys;
     Object.assign(this.inputs.height, { min: low, max: high, step: (high - low) / 200, value: high });
+  }
+
+  /** Say why something is seen or not: its title, verdict and text; nothing for null. */
+  why(found) {
+    document.getElementById("why").hidden = !found;
+    if (!found) return;
+    this.say({ "why-what": found.title, "why-verdict": found.verdict ?? "kept", "why-text": found.text });
+    this.fields["why-verdict"].className = `key ${found.verdict ?? "unknown"}`;
   }
 
   /** Text by field. */

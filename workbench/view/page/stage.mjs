@@ -1,12 +1,13 @@
 // What is drawn: the model from inside and from above, each with a camera and layers of its own.
 
 import {
-  Color, DirectionalLight, HemisphereLight, MathUtils, Mesh, MeshBasicMaterial, PerspectiveCamera, Plane,
-  Scene, SphereGeometry, Vector3, WebGLRenderer,
+  Color, DirectionalLight, HemisphereLight, MathUtils, Mesh, MeshBasicMaterial, PerspectiveCamera, Plane, Raycaster,
+  Scene, SphereGeometry, Vector2, Vector3, WebGLRenderer,
 } from "three";
 
 import { Batch } from "./batch.mjs";
 import { VERDICTS, rgb } from "./colours.mjs";
+import { Marks } from "./marks.mjs";
 import { Lines, boxLines, portalBoxes } from "./outlines.mjs";
 
 export const [INSIDE, ABOVE] = [0, 1];
@@ -37,6 +38,8 @@ export class Stage {
     this.light();
     this.head = new Mesh(new SphereGeometry(0.35), new MeshBasicMaterial({ color: 0xd55e00 }));
     this.lines = { frustum: new Lines(0xd55e00, ABOVE), cell: new Lines(0xd55e00, ABOVE), cells: new Lines(0x0072b2, ABOVE, [this.cut]), portals: new Lines(0x007a58, ABOVE, [this.cut]) };
+    this.marks = new Marks(database.maze, [INSIDE, ABOVE], INSIDE);
+    this.scene.add(this.marks.group);
     this.head.layers.set(ABOVE);
     this.scene.add(this.head, ...Object.values(this.lines).map((one) => one.mesh));
   }
@@ -124,6 +127,23 @@ export class Stage {
     sky.aspect = rest / depth;
     sky.updateProjectionMatrix();
     if (view !== "inside") this.part(sky, left, rest, depth);
+  }
+
+  /** The object at a place of the page's picture and the point of it there, of those that are drawn; or null. */
+  pick(x, y, view) {
+    const { canvas, eye, sky } = this;
+    const half = view === "both" ? Math.floor(canvas.clientWidth / 2) : canvas.clientWidth;
+    const above = view === "above" || x >= half;
+    const [left, width] = above && view === "both" ? [half, canvas.clientWidth - half] : [0, half];
+    const caster = new Raycaster();
+    caster.layers.set(above ? ABOVE : INSIDE);
+    const at = new Vector2(2 * (x - left) / width - 1, 1 - 2 * y / canvas.clientHeight);
+    caster.setFromCamera(at, above ? sky : eye);
+    const batch = above ? this.above : this.inside;
+    const hits = caster.intersectObjects(batch.meshes, false).filter(({ point }) => !above || point.z <= this.cut.constant);
+    // What one sees through is asked for only where nothing is behind it.
+    const hit = hits.find(({ object }) => object === batch.meshes[0]) ?? hits[0];
+    return hit ? { id: batch.idOf(hit.object, hit.batchId), point: hit.point.toArray() } : null;
   }
 
   part(camera, left, width, depth) {
