@@ -1,10 +1,14 @@
 """What the viewer is given is what the display database says, read here by other code."""
 
+import base64
+import gzip
+import re
+
 import numpy as np
 import pytest
 from builders.view_scripts import read_script
 from viewcell.data.scene import Role
-from viewcell.workbench.view.contents import contents
+from viewcell.workbench.view.contents import chunk_starts, chunks, contents
 
 
 @pytest.fixture(scope="module")
@@ -92,3 +96,35 @@ def test_colours_are_the_models(tmp_path):
     assert found == {"blue": 0x0000FFFF, "none": 0, "own": 0x010203FF}
     # View cells that stand anywhere claim nothing of cells.
     assert not head["claimsCells"] and not len(arrays["reached"])
+
+
+def test_chunks_are_the_geometry(walk):
+    """In order, cut between items; a view that streams has all else of one that does not."""
+    head, arrays = read_script(contents(walk, streams=True))
+    whole_head, whole = read_script(contents(walk))
+    assert head == whole_head | {"streams": True} and set(whole) - set(arrays) == {"geometry"}
+    file = (walk.folder / "geometry.bin").read_bytes()
+    starts, ends = arrays["chunkStarts"], arrays["chunkEnds"]
+    assert starts[0] == 0 and starts[-1] == walk.items.num_rows and (np.diff(starts) > 0).all()
+    for chunk, text in enumerate(chunks(walk)):
+        name, packed = re.fullmatch(r'viewcellChunks\.set\((\d+),"([^"]+)"\);\n', text).groups()
+        begin = arrays["itemOffsets"][starts[chunk]]
+        assert int(name) == chunk and gzip.decompress(base64.b64decode(packed)) == file[begin : ends[chunk]]
+    assert chunk == len(starts) - 2 > 3
+    limits = np.split(arrays["limits"], arrays["memberStarts"][1:-1])
+    assert [len(one) for one in limits] == [len(walk.potential.of(row)) for row in range(walk.sets.num_rows)]
+
+
+def test_chunks_are_neither_small_nor_large():
+    ends = np.arange(1, 100_001) * 1000
+    starts = chunk_starts(ends - 1000, ends)
+    sizes = np.diff(np.append(starts[:-1], 100_000)) * 1000
+    assert sizes.max() < 262_144 + 1000 and len(starts) > 256
+    assert chunk_starts(ends[:10] - 1000, ends[:10]).tolist() == [0, 5, 9, 10]
+    assert chunk_starts(np.zeros(0, np.int64), np.zeros(0, np.int64)).tolist() == [0]
+
+
+def test_boxes_of_objects(given, walk):
+    _, arrays = given
+    boxes = arrays["objectBoxes"].reshape(-1, 2, 3)
+    assert np.allclose(boxes, walk.boxes * walk.grid_m, atol=1e-5)

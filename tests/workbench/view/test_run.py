@@ -104,3 +104,16 @@ def test_a_failure_leaves_the_view_that_was_there(walk, tmp_path, monkeypatch):
         run.view(walk.folder, out, overwrite=True)
     assert {file.name: file.read_bytes() for file in out.iterdir()} == before
     assert not list(tmp_path.glob(".*"))
+
+
+def test_a_large_model_lies_in_chunks(walk, tmp_path, monkeypatch):
+    """Chunks of a view that was there before do not stay."""
+    monkeypatch.setattr(run, "STREAMED", 10_000)
+    out = tmp_path / "v"
+    run.view(walk.folder, out)
+    names = {file.name for file in out.iterdir()} - set(FILES)
+    assert len(names) > 3 and names == {f"geometry-{k}.js" for k in range(len(names))}
+    (out / "geometry-999.js").write_text("of another one")
+    monkeypatch.setattr(run, "STREAMED", 10_000_000)
+    run.view(walk.folder, out, overwrite=True)
+    assert sorted(file.name for file in out.iterdir()) == FILES

@@ -48,7 +48,7 @@ function seen(database, found, kind, target, none) {
   if (!found.line) return { ...found, text: none };
   const { from, to, portals } = found.line;
   const ids = [...database.clear.keys()].filter((id) => !database.clear[id] && !(kind === "object" && id === target));
-  const clear = clearance(from, to, ids, (id) => database.aroundOf(id), (id) => database.trianglesOf(id));
+  const clear = clearance(from, to, ids, (id) => database.boxOf(id), (id) => database.trianglesOf(id));
   const length = Math.hypot(...to.map((x, k) => x - from[k]));
   const way = portals.length ? ` through ${many(portals.length, "portal")}` : "";
   const by = clear ? `, clear of everything else by ${metres(clear.distance)} (${database.head.names[clear.id] || `object ${clear.id}`})` : "";

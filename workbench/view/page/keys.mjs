@@ -1,6 +1,6 @@
 // What keys, mouse and fingers ask for.
 
-import { HURRY, SPEED, TURN } from "./visitor.mjs";
+import { HURRY, TURN } from "./visitor.mjs";
 
 const STEEP = 1.4;
 const PER_PIXEL = 0.004;
@@ -41,7 +41,7 @@ export class Keys {
       if (!last) return;
       held.set(event.pointerId, [event.clientX, event.clientY]);
       moved += Math.abs(event.clientX - last[0]) + Math.abs(event.clientY - last[1]);
-      if (held.size > 1) visitor.walk(0.016, (event.clientY - last[1]) * -0.4, (event.clientX - last[0]) * 0.4, SPEED);
+      if (held.size > 1) visitor.walk(0.016, (event.clientY - last[1]) * -0.4, (event.clientX - last[0]) * 0.4, visitor.speed);
       else this.look(event.clientX - last[0], event.clientY - last[1]);
     });
   }
@@ -57,7 +57,7 @@ export class Keys {
     for (const code of this.down) if (WAYS[code]) sum[WAYS[code][0]] += WAYS[code][1];
     const hurry = [...this.down].some((code) => code.startsWith("Shift")) ? HURRY : 1;
     this.visitor.yaw += sum.turn * TURN * seconds;
-    this.visitor.walk(seconds, sum.forward, sum.right, SPEED * hurry);
+    this.visitor.walk(seconds, sum.forward, sum.right, this.visitor.speed * hurry);
     return this.down.size > 0;
   }
 }

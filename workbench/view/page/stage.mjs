@@ -6,7 +6,7 @@ import {
 } from "three";
 
 import { Batch } from "./batch.mjs";
-import { VERDICTS, rgb } from "./colours.mjs";
+import { MEMORY, VERDICTS, levelColour, rgb } from "./colours.mjs";
 import { Marks } from "./marks.mjs";
 import { Lines, boxLines, portalBoxes } from "./outlines.mjs";
 
@@ -37,7 +37,7 @@ export class Stage {
     this.orbit = { turn: -0.9, rise: 0.9, away: 1.15 * this.size() };
     this.light();
     this.head = new Mesh(new SphereGeometry(0.35), new MeshBasicMaterial({ color: 0xd55e00 }));
-    this.lines = { frustum: new Lines(0xd55e00, ABOVE), cell: new Lines(0xd55e00, ABOVE), cells: new Lines(0x0072b2, ABOVE, [this.cut]), portals: new Lines(0x007a58, ABOVE, [this.cut]) };
+    this.lines = { frustum: new Lines(0xd55e00, ABOVE), cell: new Lines(0xd55e00, ABOVE), cells: new Lines(0x0072b2, ABOVE, [this.cut]), range: new Lines(0x0072b2, ABOVE, [this.cut]), portals: new Lines(0x007a58, ABOVE, [this.cut]) };
     this.marks = new Marks(database.maze, [INSIDE, ABOVE], INSIDE);
     this.scene.add(this.marks.group);
     this.head.layers.set(ABOVE);
@@ -62,10 +62,54 @@ export class Stage {
     this.scene.background = new Color(paper);
   }
 
-  /** Show a set from inside, an array of 0 and 1; and from above what is `seen`, `unknown` and `hidden`, if asked for. */
-  show(shown, verdicts) {
-    this.inside.show(shown);
-    this.above.paint(verdicts ? (id) => rgb(VERDICTS[verdicts[id]]) : () => null);
+  /** Show all there is from above: at the levels of the view from inside where they are asked for, else as fine as is here. */
+  all(colours) {
+    const { database, inside, above } = this;
+    this.every ??= new Uint8Array(database.objects).fill(1);
+    above.show(this.every, (id) => (colours === "levels" && inside.shown[id] ? inside.items[id] : this.fit(id)));
+  }
+
+  /** What is looked at from afar: of a model that streams, the coarsest level. */
+  fit(id) {
+    const { database } = this;
+    return database.itemNear(id, database.head.streams ? database.itemStarts[id + 1] - database.itemStarts[id] - 1 : 0);
+  }
+
+  /** Colour by verdicts, memory or levels, or as the model is; `verdicts` by id, `stateOf(id)` in memory. */
+  colour(colours, { verdicts, stateOf }) {
+    const { above, inside, database } = this;
+    const level = (id) => database.items.indexOf(inside.items[id], database.itemStarts[id]) - database.itemStarts[id];
+    const hidden = rgb(VERDICTS.hidden);
+    const of = {
+      verdicts: (id) => rgb(VERDICTS[verdicts[id]]),
+      memory: (id) => rgb(MEMORY[stateOf(id)]),
+      levels: (id) => (inside.shown[id] ? levelColour(level(id)) : hidden),
+    }[colours];
+    above.paint(of ?? (() => null));
+    if (colours === "levels" || this.painted) inside.paint(colours === "levels" ? of : () => null);
+    this.painted = colours === "levels";
+  }
+
+  /** Lines around cells in range. */
+  range(cells) {
+    this.lines.range.set(boxLines(cells.flatMap(([cell]) => [...this.database.cellBoxes.subarray(6 * cell, 6 * cell + 6)])));
+  }
+
+  /** Items are no longer in memory. */
+  drop(items) {
+    this.inside.drop(items);
+    this.above.drop(items);
+  }
+
+  /** Pixels of a metre at a metre. */
+  focal() {
+    return this.canvas.clientHeight / 2 / Math.tan((FOV * Math.PI) / 360);
+  }
+
+  /** Keep what a visitor sees for the eye's frustum while they walk on, and give a copy of them; or go on, for null. */
+  hold(visitor) {
+    this.held = visitor && this.eye.clone();
+    return visitor && { point: [...visitor.point], cell: visitor.cell };
   }
 
   /** Lines around a cell, and, if asked for, cells that may be seen from it and all their portals. */
@@ -96,7 +140,7 @@ export class Stage {
 
   /** Ways from the eye to the corners of its picture, anticlockwise. */
   corners() {
-    const { eye } = this;
+    const eye = this.held ?? this.eye;
     const at = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
     return at.map(([x, y]) => new Vector3(x, y, 0.5).unproject(eye).sub(eye.position).normalize());
   }
@@ -112,7 +156,7 @@ export class Stage {
     }
     this.cut.constant = height;
     this.aim(visitor, view);
-    head.position.copy(eye.position);
+    head.position.copy((this.held ?? eye).position);
     if (view !== "above") this.lines.frustum.set(this.frustum());
     const { turn, rise, away } = this.orbit;
     const middle = view === "both" ? visitor.point : [0, 1, 2].map((k) => (this.bounds[k] + this.bounds[k + 3]) / 2);
@@ -157,7 +201,7 @@ export class Stage {
 
   /** Edges of what the eye's picture shows, as far as REACH, 6 numbers each. */
   frustum() {
-    const { eye } = this;
+    const eye = this.held ?? this.eye;
     const corners = this.corners().map((way) => way.multiplyScalar(REACH).add(eye.position).toArray());
     const middle = eye.position.toArray();
     return new Float32Array(corners.flatMap((corner, k) => [...middle, ...corner, ...corner, ...corners[(k + 1) % 4]]));

@@ -9,7 +9,7 @@ const database = {
   setOf: (cell) => (cell === 0 ? { potential: [0, 1], unknown: new Set([1]) } : null),
   isPotential: (cell, id) => id < 2,
   reachOf: (cell) => (cell === 0 ? new Set([0, 1]) : null),
-  boxOf: (id) => [10 * id, 0, 0, 10 * id + 1, 1, 1], aroundOf: (id) => [10 * id, 0, 0, 10 * id + 1, 1, 1],
+  boxOf: (id) => [10 * id, 0, 0, 10 * id + 1, 1, 1],
   trianglesOf: (id) => [10 * id, 0, 0, 10 * id + 1, 0, 0, 10 * id, 1, 0],
   cellBoxes: Float32Array.from([0, 0, 0, 1, 1, 1, 5, 0, 0, 6, 1, 1, 20, 0, 0, 21, 1, 1]),
 };
