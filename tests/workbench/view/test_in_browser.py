@@ -358,6 +358,59 @@ def test_what_memory_holds_has_colours(shown):
     assert shown.complaints() == []
 
 
+def test_names_of_rooms_stand_where_they_are_cut_open(shown):
+    """None hides another, none is of another storey, and none is there from inside."""
+    shown.choose("view", "above")
+    names = "[...document.querySelectorAll('#labels-over span:not([hidden])')]"
+    found = shown.run(f"return {names}.map((one) => [one.textContent, one.getBoundingClientRect().toJSON()])")
+    rooms = shown.run("return viewer.database.rooms().map(({ name }) => name)")
+    assert len(found) > 4 and {name for name, _ in found} <= set(rooms)
+    for k, (_, a) in enumerate(found):
+        assert all(
+            a["right"] <= b["left"] or b["right"] <= a["left"] or abs(a["top"] - b["top"]) > 10 for _, b in found[:k]
+        )
+    shown.choose("height", shown.run("return viewer.stage.bounds[2]"))
+    assert shown.run(f"return {names}.length") == 0
+    shown.choose("height", shown.run("return viewer.storeyTop()"))
+    assert shown.run(f"return {names}.length") == len(found)
+    shown.choose("view", "inside")
+    assert shown.run(f"return {names}.length") == 0
+
+
+def test_overlays_of_the_wedge_and_of_back_faces(shown):
+    shown.choose("view", "inside")
+    plain = shown.picture(0.3)
+    shown.choose("colours", "backs")
+    assert shown.run("return viewer.stage.inside.backs.value")
+    shown.choose("view", "above")
+    backs = shown.picture(0.3)
+    shown.choose("colours", "model")
+    assert (np.abs(shown.picture(0.3) - backs).max(axis=2) > 20).mean() > 0.001
+    shown.choose("wedge", True)
+    ends = shown.run("return [...viewer.stage.lines.wedge.mesh.geometry.attributes.position.array]")
+    point = shown.run("return viewer.visitor.point")
+    # From the eye to corners of what of portals is in sight, and along their edges.
+    assert len(ends) >= 36 and np.allclose(np.reshape(ends, (-1, 4, 3))[:, 0], point, atol=1e-3)
+    shown.choose("wedge", False)
+    shown.choose("view", "inside")
+    assert (np.abs(shown.picture(0.3) - plain).max(axis=2) > 8).mean() < 1e-3
+    assert shown.complaints() == []
+
+
+def test_keyboard_alone(shown):
+    """Looking up and down, turning and cutting the view from above."""
+    press = "dispatchEvent(new KeyboardEvent(arguments[1] ?? 'keydown', { code: arguments[0] }))"
+    shown.run(press, "PageUp")
+    shown.until("return viewer.visitor.pitch > 0.05")
+    shown.run(press, "PageUp", "keyup")
+    before = shown.run("return [viewer.stage.orbit.turn, viewer.stage.orbit.away, viewer.chosen.height]")
+    for key in ("KeyQ", "Equal", "BracketLeft", "KeyG", "KeyN", "KeyF"):
+        shown.run(press, key)
+    after = shown.run("return [viewer.stage.orbit.turn, viewer.stage.orbit.away, viewer.chosen.height]")
+    assert all(a != b for a, b in zip(before, after, strict=True))
+    assert shown.run("return [viewer.chosen.wedge, viewer.chosen.labels, viewer.chosen.freeze]") == [True, False, True]
+
+
 def test_frozen_what_is_seen_stays(shown):
     shown.choose("mode", "eye")
     before = shown.run("return [viewer.counts, viewer.stage.corners().map((way) => way.toArray())]")

@@ -15,6 +15,7 @@ export class Batch {
   /** Objects of a database; `layer` is that of the cameras that see them, `planes` cut them. */
   constructor(database, layer, planes = []) {
     this.database = database;
+    this.backs = { value: false };
     this.ids = Array.from({ length: database.objects }, (_, id) => id);
     this.parts = [false, true].map((clear) => this.part(clear, layer, planes));
     this.colours = this.ids.map((id) =>
@@ -31,6 +32,11 @@ export class Batch {
       side: DoubleSide, flatShading: true, clippingPlanes: planes,
       ...(clear ? { transparent: true, opacity: 0.35, depthWrite: false } : {}),
     });
+    material.onBeforeCompile = (shader) => {
+      shader.uniforms.backs = this.backs;
+      shader.fragmentShader = `uniform bool backs;\n${shader.fragmentShader}`.replace("#include <color_fragment>",
+        "#include <color_fragment>\nif (backs && !gl_FrontFacing) diffuseColor.rgb = vec3(0.6, 0.19, 0.38);");
+    };
     const room = ids.length ? ROOM : 3;
     const mesh = new BatchedMesh(Math.max(1, ids.length), room, 2 * room, material);
     const nothing = new BufferGeometry();
@@ -72,6 +78,11 @@ export class Batch {
         this.shown[id] = visible;
       }
     }
+  }
+
+  /** Colour what is seen from behind, or do not. */
+  markBacks(marked) {
+    this.backs.value = marked;
   }
 
   /** Triangles of what is shown. */

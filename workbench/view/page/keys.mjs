@@ -9,6 +9,7 @@ const STILL = 5;
 const WAYS = {
   KeyW: ["forward", 1], KeyS: ["forward", -1], KeyA: ["right", -1], KeyD: ["right", 1],
   ArrowUp: ["forward", 1], ArrowDown: ["forward", -1], ArrowLeft: ["turn", 1], ArrowRight: ["turn", -1],
+  PageUp: ["tilt", 1], PageDown: ["tilt", -1],
 };
 
 export class Keys {
@@ -53,10 +54,11 @@ export class Keys {
 
   /** Move the visitor for so many seconds; whether anything is asked for. */
   tick(seconds) {
-    const sum = { forward: 0, right: 0, turn: 0 };
+    const sum = { forward: 0, right: 0, turn: 0, tilt: 0 };
     for (const code of this.down) if (WAYS[code]) sum[WAYS[code][0]] += WAYS[code][1];
     const hurry = [...this.down].some((code) => code.startsWith("Shift")) ? HURRY : 1;
     this.visitor.yaw += sum.turn * TURN * seconds;
+    this.visitor.pitch = Math.max(-STEEP, Math.min(STEEP, this.visitor.pitch + sum.tilt * TURN * seconds));
     this.visitor.walk(seconds, sum.forward, sum.right, this.visitor.speed * hurry);
     return this.down.size > 0;
   }

@@ -5,6 +5,7 @@ import { Database } from "./database.mjs";
 import { eyeSees } from "./eye.mjs";
 import { Inquiry } from "./inquiry.mjs";
 import { Keys } from "./keys.mjs";
+import { Labels } from "./labels.mjs";
 import { Levels } from "./levels.mjs";
 import { Numbers } from "./numbers.mjs";
 import { Panel } from "./panel.mjs";
@@ -16,7 +17,7 @@ import { Visitor } from "./visitor.mjs";
 
 const VIEWS = ["inside", "both", "above"];
 const MODES = ["set", "eye", "whole"];
-const COLOURS = ["verdicts", "memory", "levels", "model"];
+const COLOURS = ["verdicts", "memory", "levels", "backs", "model"];
 // Seconds that a frame may count for: what a hidden tab misses is not walked.
 const LONGEST = 0.1;
 
@@ -29,7 +30,7 @@ class Viewer {
     this.levels = new Levels(database);
     this.numbers = new Numbers(document.getElementById("plot"));
     this.chosen = {
-      view: "both", mode: "set", colours: "verdicts", outlines: false, freeze: false, speed: this.visitor.speed, target: 0, cache: 64, pace: 1,
+      view: "both", mode: "set", colours: "verdicts", outlines: false, wedge: false, labels: true, freeze: false, speed: this.visitor.speed, target: 0, cache: 64, pace: 1,
     };
     const [low, high] = [this.stage.bounds[2], this.stage.bounds[5] + 0.1];
     this.panel = new Panel(database, [low, high], (name, value) => this.choose(name, value));
@@ -43,6 +44,7 @@ class Viewer {
     this.inquiry = new Inquiry(database, this.stage, this.panel, () => (this.stale = true));
     for (const [name, value] of Object.entries(this.chosen)) this.choose(name, value);
     this.choose("height", this.storeyTop());
+    this.labels = new Labels(document.getElementById("labels-over"), database);
     this.listen();
     this.last = performance.now();
     requestAnimationFrame((now) => this.frame(now));
@@ -60,7 +62,7 @@ class Viewer {
     addEventListener("resize", () => (this.stale = true));
     const dark = matchMedia("(prefers-color-scheme: dark)");
     const dress = () => {
-      this.stage.dress(dark.matches ? 0x10161b : 0xdfe9f1);
+      this.stage.dress(dark.matches ? [0x10161b, 0x20282c] : [0xdfe9f1, 0xc9cfc0]);
       this.stale = true;
     };
     dark.addEventListener("change", dress);
@@ -83,6 +85,11 @@ class Viewer {
     if (code === "KeyV") next("view", VIEWS);
     if (code === "KeyM") next("mode", MODES);
     if (code === "KeyC") next("colours", COLOURS);
+    if (code === "KeyN") this.choose("labels", !this.chosen.labels);
+    if (code === "KeyG") this.choose("wedge", !this.chosen.wedge);
+    if (code === "Minus" || code === "Equal") this.stage.zoom(code === "Minus" ? 1.15 : 1 / 1.15);
+    if (code === "KeyQ" || code === "KeyE") this.stage.swing(code === "KeyQ" ? -40 : 40, 0);
+    if (code === "BracketLeft" || code === "BracketRight") this.choose("height", this.chosen.height + (code === "BracketLeft" ? -0.3 : 0.3));
     if (code === "KeyO") this.choose("outlines", !this.chosen.outlines);
     if (code === "KeyF") this.choose("freeze", !this.chosen.freeze);
     if (code === "KeyR") this.choose("record");
@@ -143,11 +150,11 @@ class Viewer {
   }
 
   /** What the eye sees of its cell's set, as an array of 0 and 1; or all of the set where that cannot be told. */
-  sight(shown) {
+  sight(shown, passed = null) {
     const { database, observer, stage } = this;
     const found = database.maze.axes.length
       ? eyeSees(database.maze, observer.point, stage.planes(), (id) => database.boxOf(id),
-        (cell) => database.objectsIn(cell), shown, database.reachOf(observer.cell))
+        (cell) => database.objectsIn(cell), shown, database.reachOf(observer.cell), passed)
       : null;
     if (!found) return shown;
     const out = new Uint8Array(database.objects);
@@ -179,6 +186,11 @@ class Viewer {
     const { database, stage, observer, levels } = this;
     if (!this.frozen) stage.aim(this.visitor, this.chosen.view);
     const shown = this.chosen.mode === "eye" ? this.sight(this.kept) : this.kept;
+    if (this.chosen.wedge) {
+      const polygons = [];
+      this.sight(this.kept, (polygon) => polygons.push(polygon));
+      stage.wedge(observer.point, polygons);
+    } else stage.wedge(observer.point, []);
     const focal = stage.focal();
     this.wanted = [];
     const coarsest = [];
@@ -240,7 +252,8 @@ class Viewer {
   }
 
   frame(now) {
-    const elapsed = now - this.last;
+    // A frame's time may be from before the page was ready.
+    const elapsed = Math.max(0, now - this.last);
     const seconds = Math.min(LONGEST, elapsed / 1000);
     this.last = now;
     const before = this.visitor.point.join();
@@ -259,9 +272,11 @@ class Viewer {
     if (this.stale || this.restage || moves || (this.chosen.colours === "memory" && this.ahead.fades(now))) {
       if (this.restage) this.stage.all(this.chosen.colours);
       const again = moves && this.levels.heard(elapsed);
-      if (this.restage || again || (moves && (this.chosen.mode === "eye" || this.levels.target))) this.look();
+      if (this.restage || again || (moves && (this.chosen.mode === "eye" || this.chosen.wedge || this.levels.target))) this.look();
       if (this.chosen.colours === "memory" || this.chosen.colours === "levels") this.colour();
       this.stage.draw(this.visitor, this.chosen.view, this.chosen.height);
+      const { left, width } = this.stage.skyPart(this.chosen.view);
+      this.labels.draw(this.stage.sky, left, this.chosen.labels ? width : 0, this.canvas.clientHeight, this.chosen.height);
       if (moves) this.numbers.add(elapsed, this.triangles);
       this.panel.say({ rate: `${this.numbers.rate.toFixed(0)} frames a second` });
       this.panel.plot(this.numbers, this.levels.target);

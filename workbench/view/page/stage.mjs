@@ -1,7 +1,7 @@
 // What is drawn: the model from inside and from above, each with a camera and layers of its own.
 
 import {
-  Color, DirectionalLight, HemisphereLight, MathUtils, Mesh, MeshBasicMaterial, PerspectiveCamera, Plane, Raycaster,
+  CircleGeometry, Color, DirectionalLight, HemisphereLight, MathUtils, Mesh, MeshBasicMaterial, PerspectiveCamera, Plane, Raycaster,
   Scene, SphereGeometry, Vector2, Vector3, WebGLRenderer,
 } from "three";
 
@@ -37,11 +37,19 @@ export class Stage {
     this.orbit = { turn: -0.9, rise: 0.9, away: 1.15 * this.size() };
     this.light();
     this.head = new Mesh(new SphereGeometry(0.35), new MeshBasicMaterial({ color: 0xd55e00 }));
-    this.lines = { frustum: new Lines(0xd55e00, ABOVE), cell: new Lines(0xd55e00, ABOVE), cells: new Lines(0x0072b2, ABOVE, [this.cut]), range: new Lines(0x0072b2, ABOVE, [this.cut]), portals: new Lines(0x007a58, ABOVE, [this.cut]) };
+    const lines = { frustum: 0xd55e00, cell: 0xd55e00, cells: 0x0072b2, range: 0x0072b2, portals: 0x007a58, wedge: 0xcc79a7 };
+    const whole = ["frustum", "cell", "wedge"];
+    this.lines = Object.fromEntries(Object.entries(lines).map(([name, colour]) =>
+      [name, new Lines(colour, ABOVE, whole.includes(name) ? [] : [this.cut])]));
     this.marks = new Marks(database.maze, [INSIDE, ABOVE], INSIDE);
     this.scene.add(this.marks.group);
     this.head.layers.set(ABOVE);
-    this.scene.add(this.head, ...Object.values(this.lines).map((one) => one.mesh));
+    this.land = new Mesh(new CircleGeometry(4 * this.size(), 64), new MeshBasicMaterial({ color: 0xc9cfc0 }));
+    const b = this.bounds;
+    // A little below the model, lest the two fight for pixels.
+    this.land.position.set((b[0] + b[3]) / 2, (b[1] + b[4]) / 2, b[2] - 0.002 * this.size());
+    this.land.layers.enable(ABOVE);
+    this.scene.add(this.land, this.head, ...Object.values(this.lines).map((one) => one.mesh));
   }
 
   size() {
@@ -57,9 +65,24 @@ export class Stage {
     this.scene.add(sky, sun);
   }
 
-  /** Colours of what is behind everything. */
-  dress(paper) {
-    this.scene.background = new Color(paper);
+  /** Colours of the sky and of the ground. */
+  dress([sky, land]) {
+    this.scene.background = new Color(sky);
+    this.land.material.color.set(land);
+  }
+
+  /** Draw from an eye to what of portals is in its sight. */
+  wedge(eye, polygons) {
+    const ends = polygons.flatMap((polygon) => polygon.flatMap((corner, k) =>
+      [[0, 0, 0], corner, corner, polygon[(k + 1) % polygon.length]].flatMap((point) => point.map((x, axis) => x + eye[axis]))));
+    this.lines.wedge.set(new Float32Array(ends));
+  }
+
+  /** Where on the page the view from above is. */
+  skyPart(view) {
+    const width = this.canvas.clientWidth;
+    const left = { inside: width, both: Math.floor(width / 2), above: 0 }[view];
+    return { left, width: width - left };
   }
 
   /** Show all there is from above: at the levels of the view from inside where they are asked for, else as fine as is here. */
@@ -85,6 +108,7 @@ export class Stage {
       memory: (id) => rgb(MEMORY[stateOf(id)]),
       levels: (id) => (inside.shown[id] ? levelColour(level(id)) : hidden),
     }[colours];
+    for (const batch of [above, inside]) batch.markBacks(colours === "backs");
     above.paint(of ?? (() => null));
     if (colours === "levels" || this.painted) inside.paint(colours === "levels" ? of : () => null);
     this.painted = colours === "levels";
