@@ -7,7 +7,7 @@ import base64
 import gzip
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pyarrow as pa
@@ -19,37 +19,57 @@ from ...data.store.walk_folder import GEOMETRY, WalkFolder
 
 KINDS = {"uint8": "u1", "uint16": "u2", "uint32": "u4", "int32": "i4", "float32": "f4"}
 ROW = 12
+# A box of what is nowhere.
+NOWHERE = np.array([1, 1, 1, -1, -1, -1], np.float32) * 1e9
+# About so many chunks, but none smaller or larger than this [bytes].
+CHUNKS = 256
+CHUNK_BYTES = (4_096, 262_144)
 STOOD_ON = re.compile(r"Ifc(Stair|Ramp|Slab|Roof|Covering|Plate|Site)", re.IGNORECASE)
 
 
-def contents(walk: WalkFolder) -> str:
+def contents(walk: WalkFolder, *, streams: bool = False) -> str:
     """The script that hands the database to the viewer: the same for the same database.
 
     Args:
         walk: every file of it is read.
+        streams: leave geometry out: chunks of it are scripts of their own.
 
     Raises:
         InputError: a table is unreadable, or geometry is cut short.
     """
     kinds, kind = np.unique(walk.objects["kind"].to_pylist(), return_inverse=True)
     arrays = {"kinds": kind.astype(np.uint16), **_objects(walk), **_items(walk), **_sets(walk), **_cells(walk)}
-    places, parts, begin = {}, [], 0
-    for name, values in arrays.items():
-        data = np.ascontiguousarray(values).tobytes()
-        places[name] = [KINDS[str(values.dtype)], begin, values.size]
-        parts.append(data)
-        begin += len(data)
+    if streams:
+        del arrays["geometry"]
     head = {
         "names": walk.objects["name"].to_pylist(),
         "kinds": kinds.tolist(),
         "cellNames": [name or "" for name in walk.cells["name"].to_pylist()],
         "claimsCells": walk.claims_cells,
+        "streams": streams,
         "bounds": _bounds(_boxes(walk.objects)),
     }
+    return script("viewcellData", head, arrays)
+
+
+def script(name: str, head: dict, arrays: dict[str, np.ndarray]) -> str:
+    """A script that hands a page some arrays, under a name that is global there: the same for the same arrays.
+
+    Args:
+        name: such as viewcellData.
+        head: what else it says.
+        arrays: by name, of the dtypes in KINDS.
+    """
+    places, parts, begin = {}, [], 0
+    for own, values in arrays.items():
+        data = np.ascontiguousarray(values).tobytes()
+        places[own] = [KINDS[str(values.dtype)], begin, values.size]
+        parts.append(data)
+        begin += len(data)
     # Without a time in it, the same bytes give the same text.
     packed = base64.b64encode(gzip.compress(b"".join(parts), compresslevel=9, mtime=0)).decode()
     text = json.dumps({"head": head, "arrays": places}, ensure_ascii=True, separators=(",", ":"))
-    return f'globalThis.viewcellData={text[:-1]},"packed":"{packed}"}};\n'
+    return f'globalThis.{name}={text[:-1]},"packed":"{packed}"}};\n'
 
 
 def _boxes(table: pa.Table) -> np.ndarray:
@@ -68,8 +88,10 @@ def _objects(walk: WalkFolder) -> dict[str, np.ndarray]:
     table = walk.objects
     starts, items = walk.object_items
     matrices = np.array(table["transform"].to_pylist(), np.float64).reshape(-1, 16)[:, :ROW]
+    boxes = _boxes(table)
     colours = table["colour"].fill_null(0).to_numpy().astype(np.uint32)
     return {
+        "objectBoxes": np.where(np.isnan(boxes), NOWHERE, boxes),
         "transforms": matrices.astype(np.float32),
         "clear": np.array([role == Role.TRANSPARENT.value for role in table["role"].to_pylist()], np.uint8),
         "ground": np.array(_ground(table), np.uint8),
@@ -100,12 +122,39 @@ def _item_colours(walk: WalkFolder) -> np.ndarray:
 def _items(walk: WalkFolder) -> dict[str, np.ndarray]:
     names = {"itemOffsets": "offset", "itemVertices": "vertices", "itemFaces": "faces"}
     found = {name: walk.items[column].to_numpy().astype(np.uint32) for name, column in names.items()}
+    found["itemErrors"] = walk.items["error_m"].to_numpy().astype(np.float32)
+    ends = (walk.items["offset"].to_numpy() + walk.items["size"].to_numpy()).astype(np.int64)
+    starts = chunk_starts(found["itemOffsets"].astype(np.int64), ends)
+    found |= {"chunkStarts": starts.astype(np.uint32), "chunkEnds": ends[starts[1:] - 1].astype(np.uint32)}
     return found | {"geometry": np.frombuffer((walk.folder / GEOMETRY).read_bytes(), np.uint8)}
+
+
+def chunks(walk: WalkFolder) -> Iterator[str]:
+    """Scripts that hand the chunks of the geometry to the viewer, in order."""
+    found = _items(walk)
+    begins = found["itemOffsets"][found["chunkStarts"][:-1]]
+    for chunk, (begin, end) in enumerate(zip(begins, found["chunkEnds"], strict=True)):
+        packed = base64.b64encode(gzip.compress(found["geometry"][begin:end].tobytes(), compresslevel=6, mtime=0))
+        yield f'viewcellChunks.set({chunk},"{packed.decode()}");\n'
+
+
+def chunk_starts(offsets: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """First item of each chunk, and the count of items: what lies together in the file and is read together, int64.
+
+    Args:
+        offsets: first byte of each item, ascending, int64.
+        ends: past the last byte of each, int64.
+    """
+    if not len(ends):
+        return np.zeros(1, np.int64)
+    size = int(np.clip(ends[-1] // CHUNKS, *CHUNK_BYTES))
+    return np.append(np.unique(offsets // size, return_index=True)[1], len(offsets))
 
 
 def _sets(walk: WalkFolder) -> dict[str, np.ndarray]:
     rows = {int(cell): row for row, cell in enumerate(walk.cells["cell_id"].to_pylist())}
     found = {"viewCells": np.array([rows[cell] for cell in walk.sets["cell_id"].to_pylist()], np.int32)}
+    found |= {"limits": walk.limits, "memberStarts": walk.potential.ids()[0].astype(np.uint32)}
     for name, column in (("potential", "potential"), ("unknown", "unknown"), ("reached", "cells")):
         found |= _codes(name, (code or b"" for code in walk.sets[column].to_pylist()))
     return found

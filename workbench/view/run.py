@@ -12,12 +12,14 @@ from markupsafe import Markup, escape
 
 from ...data.errors import InputError
 from ...data.progress import phase
+from ...data.store.bake_folder import read_bake
 from ...data.store.scene_folder import held_manifest
-from ...data.store.walk_folder import KIND, read_walk
+from ...data.store.walk_folder import GEOMETRY, KIND, read_walk
 from ..files import write_files
 from ..pack.run import pack
 from ..pages import fill
-from .contents import contents
+from .contents import chunks, contents, script
+from .reasons import reasons
 
 if TYPE_CHECKING:
     from ...data.store.bake_folder import BakeFolder
@@ -30,6 +32,11 @@ SCRIPT = "viewer.js"
 LICENCES = f"{SCRIPT}.LEGAL.txt"
 # A page opened by a double-click may load no more than this in one script, in bytes.
 LARGEST = 200_000_000
+# With more geometry than this it is read in chunks, as it is looked ahead to [bytes].
+STREAMED = 8_000_000
+CHUNK = "geometry-{}.js"
+
+NO_REASONS = script("viewcellReasons", {"certified": None}, {})
 
 
 @dataclass(frozen=True)
@@ -80,16 +87,28 @@ def view(
     _check_place(out, overwrite)
     with phase("view"), tempfile.TemporaryDirectory() as scratch:
         walk = read_walk(folder) if packed else pack(folder, Path(scratch) / f"{folder.stem}.walk")
-        data = contents(walk)
+        streams = (walk.folder / GEOMETRY).stat().st_size > STREAMED
+        data, why = contents(walk, streams=streams), _reasons(folder, walk, packed)
         if len(data) > LARGEST:
             raise InputError(
                 f"{folder}: expected a model whose view takes at most {LARGEST // 10**6} MB, found {len(data) // 10**6}"
             )
-        title = folder.stem
         own = Markup((PAGE / "view.css").read_text("utf-8"))
-        texts = {"data.js": data.encode(), "index.html": fill(PAGE, "index.html", title=title, own=own).encode()}
+        page = fill(PAGE, "index.html", title=folder.stem, own=own)
+        texts = {"data.js": data.encode(), "why.js": why.encode(), "index.html": page.encode()}
+        texts |= {CHUNK.format(k): text.encode() for k, text in enumerate(chunks(walk) if streams else ())}
         write_files(out, lambda: texts | {name: (BUILT / name).read_bytes() for name in (SCRIPT, LICENCES)})
+        for left in set(out.glob(CHUNK.format("*"))) - {out / name for name in texts}:
+            left.unlink()
     return View(out / "index.html")
+
+
+def _reasons(folder: Path, walk: "WalkFolder", packed: bool) -> str:
+    """Sightlines and certificates of the bake; of a database whose bake is elsewhere, or has changed, nothing."""
+    place = walk.bake_place if packed else folder
+    there = not packed or (held_manifest(place, "bake") is not None and not walk.stale())
+    text = reasons(read_bake(place), walk) if there else NO_REASONS
+    return text if len(text) <= LARGEST else NO_REASONS
 
 
 def _check_place(out: Path, overwrite: bool) -> None:

@@ -2,28 +2,18 @@
 
 import base64
 import gzip
-import json
+import re
 
 import numpy as np
 import pytest
+from builders.view_scripts import read_script
 from viewcell.data.scene import Role
-from viewcell.workbench.view.contents import contents
-
-DTYPES = {"u1": "u1", "u2": "<u2", "u4": "<u4", "i4": "<i4", "f4": "<f4"}
-
-
-def read(text):
-    data = json.loads(text.removeprefix("globalThis.viewcellData=").removesuffix(";\n"))
-    block = gzip.decompress(base64.b64decode(data["packed"]))
-    arrays = {}
-    for name, (kind, begin, count) in data["arrays"].items():
-        arrays[name] = np.frombuffer(block, DTYPES[kind], count, begin)
-    return data["head"], arrays
+from viewcell.workbench.view.contents import chunk_starts, chunks, contents
 
 
 @pytest.fixture(scope="module")
 def given(walk):
-    return read(contents(walk))
+    return read_script(contents(walk))
 
 
 def test_objects_and_cells_are_in_their_order(given, walk, office):
@@ -101,8 +91,40 @@ def test_colours_are_the_models(tmp_path):
     cells = tmp_path / "cells.csv"
     cells.write_text("min_x,min_y,min_z,max_x,max_y,max_z\n2,2,2,3,3,3\n")
     made = bake(Scene(definitions, objects, source="boxes"), tmp_path / "a.bake", method="occluders", cells=str(cells))
-    head, arrays = read(contents(pack(made)))
+    head, arrays = read_script(contents(pack(made)))
     found = dict(zip(head["names"], arrays["colours"].tolist(), strict=True))
     assert found == {"blue": 0x0000FFFF, "none": 0, "own": 0x010203FF}
     # View cells that stand anywhere claim nothing of cells.
     assert not head["claimsCells"] and not len(arrays["reached"])
+
+
+def test_chunks_are_the_geometry(walk):
+    """In order, cut between items; a view that streams has all else of one that does not."""
+    head, arrays = read_script(contents(walk, streams=True))
+    whole_head, whole = read_script(contents(walk))
+    assert head == whole_head | {"streams": True} and set(whole) - set(arrays) == {"geometry"}
+    file = (walk.folder / "geometry.bin").read_bytes()
+    starts, ends = arrays["chunkStarts"], arrays["chunkEnds"]
+    assert starts[0] == 0 and starts[-1] == walk.items.num_rows and (np.diff(starts) > 0).all()
+    for chunk, text in enumerate(chunks(walk)):
+        name, packed = re.fullmatch(r'viewcellChunks\.set\((\d+),"([^"]+)"\);\n', text).groups()
+        begin = arrays["itemOffsets"][starts[chunk]]
+        assert int(name) == chunk and gzip.decompress(base64.b64decode(packed)) == file[begin : ends[chunk]]
+    assert chunk == len(starts) - 2 > 3
+    limits = np.split(arrays["limits"], arrays["memberStarts"][1:-1])
+    assert [len(one) for one in limits] == [len(walk.potential.of(row)) for row in range(walk.sets.num_rows)]
+
+
+def test_chunks_are_neither_small_nor_large():
+    ends = np.arange(1, 100_001) * 1000
+    starts = chunk_starts(ends - 1000, ends)
+    sizes = np.diff(np.append(starts[:-1], 100_000)) * 1000
+    assert sizes.max() < 262_144 + 1000 and len(starts) > 256
+    assert chunk_starts(ends[:10] - 1000, ends[:10]).tolist() == [0, 5, 9, 10]
+    assert chunk_starts(np.zeros(0, np.int64), np.zeros(0, np.int64)).tolist() == [0]
+
+
+def test_boxes_of_objects(given, walk):
+    _, arrays = given
+    boxes = arrays["objectBoxes"].reshape(-1, 2, 3)
+    assert np.allclose(boxes, walk.boxes * walk.grid_m, atol=1e-5)

@@ -7,13 +7,21 @@ import io
 import shutil
 import threading
 import time
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from builders.chromium import chromium
+from viewcell.data.buildings.office import make_office
 from viewcell.data.scene import OPAQUE
 from viewcell.verify.rays.embree import embree_scene
+from viewcell.workbench.bake.run import bake
+from viewcell.workbench.bake.settings import Settings
+from viewcell.workbench.pack.run import pack
 from viewcell.workbench.view.run import view
+from viewcell.workbench.walk.pages import frames_csv
+from viewcell.workbench.walk.path import read_path
+from viewcell.workbench.walk.run import walk as walked
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +34,27 @@ def browser(tmp_path_factory):
 @pytest.fixture(scope="module")
 def folder(walk, built, tmp_path_factory):
     return view(walk, tmp_path_factory.mktemp("view") / "office.view").page.parent
+
+
+@contextmanager
+def served(folder, seconds=0.0):
+    """Address of a view on a server, which waits for so long before each chunk."""
+
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *_):
+            pass
+
+        def do_GET(self):
+            time.sleep(seconds if "geometry" in self.path else 0)
+            super().do_GET()
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=folder))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}/index.html"
+    finally:
+        server.shutdown()
+        server.server_close()
 
 
 class Shown:
@@ -157,9 +186,8 @@ def test_a_set_that_lacks_a_wall_is_seen_to(shown):
     shown.choose("view", "inside")
     whole = shown.picture(0.3)
     walls = "[...viewer.database.head.names.keys()].filter((id) => /wall/i.test(viewer.database.head.names[id]))"
-    shown.run(f"for (const id of {walls}) viewer.stage.inside.shown[id] = 1;")
     shown.run(f"const left = viewer.stage.inside.shown.slice(); for (const id of {walls}) left[id] = 0;"
-              "viewer.stage.inside.show(left);")  # fmt: skip
+              "viewer.stage.inside.show(left, (id) => viewer.stage.inside.items[id]);")  # fmt: skip
     assert (np.abs(shown.picture(0.3) - whole).max(axis=2) > 8).mean() > 0.01
 
 
@@ -229,7 +257,7 @@ def test_from_above_verdicts_have_colours(shown):
     shown.choose("view", "above")
     shown.choose("height", shown.run("return viewer.stage.bounds[5] - 0.6"))
     coloured = shown.picture(0.0)
-    shown.choose("verdicts", False)
+    shown.choose("colours", "model")
     plain = shown.picture(0.0)
     assert (np.abs(coloured - plain).max(axis=2) > 20).mean() > 0.05
     shown.choose("outlines", True)
@@ -237,19 +265,262 @@ def test_from_above_verdicts_have_colours(shown):
     assert shown.complaints() == []
 
 
-def test_through_a_server(browser, folder):
-    class Quiet(http.server.SimpleHTTPRequestHandler):
-        def log_message(self, *_):
-            pass
+@pytest.fixture(scope="module")
+def certified(built, tmp_path_factory):
+    out = tmp_path_factory.mktemp("certified") / "office.bake"
+    made = bake(make_office(floors=1, rooms_per_side=3), out, settings=Settings(certify=True), threads=1)
+    return view(made.folder, out.with_suffix(".view")).page.parent
 
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=folder))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        shown = Shown(browser, f"http://127.0.0.1:{server.server_port}/index.html")
-        assert shown.run("return document.documentElement.dataset.ready") == "1"
-    finally:
-        server.shutdown()
-        server.server_close()
+
+def test_why_something_is_seen_or_not(browser, certified):
+    """A click on what one sees: its sightline. From above on what is hidden: what the proof names. Esc ends it."""
+    shown = Shown(browser, (certified / "index.html").as_uri())
+    shown.choose("view", "inside")
+    shown.browser.find_element("id", "canvas").click()
+    shown.until("return !document.getElementById('why').hidden")
+    found = shown.run("return { ...viewer.inquiry.found, id: viewer.inquiry.asked.id, cell: viewer.cell }")
+    assert found["verdict"] == "seen" and "A sightline of" in found["text"] and found["clear"]["distance"] > 0
+    box, to = found["box"], found["line"]["to"]
+    assert all(box[k] - 0.01 <= to[k] <= box[k + 3] + 0.01 for k in range(3))
+    shown.run("viewer.choose('object', viewer.database.head.names.findIndex((_, id) =>"
+              "!viewer.database.isPotential(viewer.cell, id) && viewer.database.triangleCounts[id]))")  # fmt: skip
+    shown.until("return viewer.inquiry.found.verdict === 'hidden'")
+    assert shown.run("return viewer.inquiry.found.corners.length") >= 12
+    assert shown.run("return document.getElementById('why-text').textContent").startswith("Proved hidden: ")
+    # From elsewhere the answer is another one.
+    for cell in shown.run("return [...viewer.database.viewCells]"):
+        shown.choose("cell", cell)
+        shown.until("return viewer.inquiry.from === viewer.visitor.cell")
+        cells = shown.run("return [...viewer.database.reachOf(viewer.cell)].length")
+        assert shown.run("return viewer.inquiry.found.verdict") in ("seen", "unknown", "hidden") and cells
+    room = shown.run("return viewer.database.rooms()[0].cell")
+    shown.run("viewer.choose('room', arguments[0])", room)
+    shown.until("return viewer.inquiry.asked.kind === 'cell' && viewer.inquiry.from === viewer.cell")
+    shown.run("dispatchEvent(new KeyboardEvent('keydown', { code: 'Escape' }))")
+    shown.until("return document.getElementById('why').hidden && viewer.stage.marks.solid.length === 0")
+    assert shown.complaints() == []
+
+
+def test_reasons_that_cannot_be_read_are_said(browser, folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "v")
+    (tmp_path / "v" / "why.js").unlink()
+    shown = Shown(browser, (tmp_path / "v" / "index.html").as_uri())
+    shown.run("viewer.choose('object', 0)")
+    shown.until("return document.getElementById('note').textContent === "
+                "'No reason can be given: why.js cannot be read'")  # fmt: skip
+
+
+def test_a_tour_of_walk_is_replayed_and_a_recording_is_walked(shown, walk, tmp_path):
+    """Python's path in the page, its eyes where Python had them; what the page records is a path for Python."""
+    made = walked(walk.folder, frames=60, seed=3)
+    text = frames_csv(made).decode()
+    shown.run("viewer.choose('record'); viewer.choose('pace', 2); viewer.choose('path', arguments[0])", text)
+    shown.run("globalThis.at = []; const { tour } = viewer; const tick = tour.tick.bind(tour);"
+              "tour.tick = (visitor, s) => {"
+              "const goes = tick(visitor, s); if (goes) at.push([tour.t, ...visitor.point, 0, visitor.cell]);"
+              "return goes; }")  # fmt: skip
+    shown.until("return viewer.tour.frames === null")
+    found = np.array(shown.run("return at"))
+    path = made.path
+    times = np.minimum(found[:, 0], path.t[-1] - path.t[0]) + path.t[0]
+    eyes = np.stack([np.interp(times, path.t, path.eyes[:, axis]) for axis in range(3)], axis=1)
+    assert len(found) > 5 and np.abs(found[:, 1:4] - eyes).max() < 1e-6
+    assert (found[:, 5] >= 0).all() and len(set(found[:, 5])) > 1
+    recorded = tmp_path / "path.csv"
+    recorded.write_text(shown.run("return viewer.tour.record(0)"))
+    again = read_path(recorded)
+    assert len(again) > 3 and walked(walk.folder, recorded).ok
+    shown.run("viewer.choose('path', 'x,y\\n1,2')")
+    assert shown.run("return document.getElementById('note').textContent").startswith("path: expected the column z")
+    assert shown.complaints() == []
+
+
+def test_what_memory_holds_has_colours(shown):
+    """In a small memory what is needed is read, the rest given up; its bound is never passed."""
+    shown.choose("colours", "memory")
+    shown.choose("cache", 0.013)
+    seen = set()
+    for cell in shown.run("return [...viewer.database.viewCells]"):
+        shown.choose("cell", cell)
+        shown.until("return viewer.ahead.busy === 0 && !viewer.ahead.stale")
+        held, states, reach, chunks = shown.run(
+            "const { ahead, database } = viewer; const { memory } = ahead; const states = {};"
+            "const ids = [...database.head.names.keys()];"
+            "for (const id of ids) for (const now of [0, Infinity]) states[ahead.stateOf(id, now)] = 1;"
+            "return [memory.claimed, Object.keys(states), ahead.cells, memory.state.reduce((a, b) => a + (b > 0), 0)]"
+        )
+        assert 0 < held <= 13_000 and chunks > 1
+        seen |= set(states)
+        assert reach[0] == [cell, 0] and all(0 <= far <= 2 for _, far in reach)
+    assert shown.run("return viewer.ahead.memory.fetched") > 13_000
+    assert seen >= {"resident", "read", "release"} and seen & {"ahead", "absent"}
+    shown.choose("view", "above")
+    assert shown.complaints() == []
+
+
+def test_names_of_rooms_stand_where_they_are_cut_open(shown):
+    """None hides another, none is of another storey, and none is there from inside."""
+    shown.choose("view", "above")
+    names = "[...document.querySelectorAll('#labels-over span:not([hidden])')]"
+    found = shown.run(f"return {names}.map((one) => [one.textContent, one.getBoundingClientRect().toJSON()])")
+    rooms = shown.run("return viewer.database.rooms().map(({ name }) => name)")
+    assert len(found) > 4 and {name for name, _ in found} <= set(rooms)
+    for k, (_, a) in enumerate(found):
+        assert all(
+            a["right"] <= b["left"] or b["right"] <= a["left"] or abs(a["top"] - b["top"]) > 10 for _, b in found[:k]
+        )
+    shown.choose("height", shown.run("return viewer.stage.bounds[2]"))
+    assert shown.run(f"return {names}.length") == 0
+    shown.choose("height", shown.run("return viewer.storeyTop()"))
+    assert shown.run(f"return {names}.length") == len(found)
+    shown.choose("view", "inside")
+    assert shown.run(f"return {names}.length") == 0
+
+
+def test_overlays_of_the_wedge_and_of_back_faces(shown):
+    shown.choose("view", "inside")
+    plain = shown.picture(0.3)
+    shown.choose("colours", "backs")
+    assert shown.run("return viewer.stage.inside.backs.value")
+    shown.choose("view", "above")
+    backs = shown.picture(0.3)
+    shown.choose("colours", "model")
+    assert (np.abs(shown.picture(0.3) - backs).max(axis=2) > 20).mean() > 0.001
+    shown.choose("wedge", True)
+    ends = shown.run("return [...viewer.stage.lines.wedge.mesh.geometry.attributes.position.array]")
+    point = shown.run("return viewer.visitor.point")
+    # From the eye to corners of what of portals is in sight, and along their edges.
+    assert len(ends) >= 36 and np.allclose(np.reshape(ends, (-1, 4, 3))[:, 0], point, atol=1e-3)
+    shown.choose("wedge", False)
+    shown.choose("view", "inside")
+    assert (np.abs(shown.picture(0.3) - plain).max(axis=2) > 8).mean() < 1e-3
+    assert shown.complaints() == []
+
+
+def test_keyboard_alone(shown):
+    """Looking up and down, turning and cutting the view from above."""
+    press = "dispatchEvent(new KeyboardEvent(arguments[1] ?? 'keydown', { code: arguments[0] }))"
+    shown.run(press, "PageUp")
+    shown.until("return viewer.visitor.pitch > 0.05")
+    shown.run(press, "PageUp", "keyup")
+    before = shown.run("return [viewer.stage.orbit.turn, viewer.stage.orbit.away, viewer.chosen.height]")
+    for key in ("KeyQ", "Equal", "BracketLeft", "KeyG", "KeyN", "KeyF"):
+        shown.run(press, key)
+    after = shown.run("return [viewer.stage.orbit.turn, viewer.stage.orbit.away, viewer.chosen.height]")
+    assert all(a != b for a, b in zip(before, after, strict=True))
+    assert shown.run("return [viewer.chosen.wedge, viewer.chosen.labels, viewer.chosen.freeze]") == [True, False, True]
+
+
+def test_frozen_what_is_seen_stays(shown):
+    shown.choose("mode", "eye")
+    before = shown.run("return [viewer.counts, viewer.stage.corners().map((way) => way.toArray())]")
+    shown.choose("freeze", True)
+    other = shown.run("return viewer.database.rooms().at(-1).cell")
+    shown.run("viewer.choose('cell', arguments[0]); viewer.visitor.yaw = 2", other)
+    shown.until("return viewer.visitor.yaw === 2 && !viewer.stale && viewer.turned.startsWith('2 ')")
+    shown.run("viewer.look()")
+    assert shown.run("return [viewer.counts, viewer.stage.corners().map((way) => way.toArray())]") == before
+    shown.choose("freeze", False)
+    assert shown.run("return viewer.cell") == other
+
+
+@pytest.fixture(scope="module")
+def streamed(built, tmp_path_factory):
+    """A view of a bake with levels, whose geometry lies in chunks."""
+    out = tmp_path_factory.mktemp("streamed") / "office.bake"
+    made = bake(make_office(floors=1, rooms_per_side=3), out, settings=Settings(lods=True), threads=1)
+    walk = pack(made.folder, flatten=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("viewcell.workbench.view.run.STREAMED", 0)
+        return view(walk, out.with_suffix(".view")).page.parent
+
+
+SETTLED = "return viewer.ahead.busy === 0 && !viewer.ahead.stale && !viewer.restage"
+
+
+def test_levels_follow_the_frame_time(browser, streamed):
+    """What takes too long is drawn coarser, what is quick again finer; colours say at which level."""
+    shown = Shown(browser, (streamed / "index.html").as_uri())
+    shown.choose("view", "inside")
+    shown.until(SETTLED)
+    fine = shown.run("return viewer.stage.inside.triangles")
+    shown.choose("colours", "levels")
+    shown.choose("target", 20)
+    found = shown.run("for (let k = 0; k < 60; k++) viewer.levels.heard(100); viewer.look();"
+                      "return [viewer.stage.inside.triangles, viewer.levels.tolerance]")  # fmt: skip
+    assert found[0] < 0.8 * fine and found[1] == 64
+    coarse = shown.picture(0.3)
+    shown.run("for (let k = 0; k < 200; k++) viewer.levels.heard(1); viewer.look()")
+    assert fine >= shown.run("return viewer.stage.inside.triangles") > found[0]
+    shown.choose("target", 0)
+    assert shown.run("return viewer.stage.inside.triangles") == fine
+    assert (np.abs(shown.picture(0.3) - coarse).max(axis=2) > 8).any()
+
+
+@pytest.mark.parametrize("scheme", ["file", "http"])
+def test_geometry_streams_within_its_memory(browser, streamed, scheme):
+    """Chunks come as they are looked ahead to, and go; what is here is drawn, and what the set holds comes at last."""
+    with served(streamed) as address:
+        shown = Shown(browser, address if scheme == "http" else (streamed / "index.html").as_uri())
+        shown.choose("view", "inside")
+        total = shown.run("return viewer.database.chunkIds.reduce((sum, k) => sum + viewer.database.chunkBytes(k), 0)")
+        shown.choose("cache", total / 2e6)
+        for cell in shown.run("return [...viewer.database.viewCells]"):
+            shown.choose("cell", cell)
+            shown.until(SETTLED)
+            claimed, held, missing = shown.run(
+                "return [viewer.ahead.memory.claimed, [...viewer.database.parts.values()].reduce((sum, part) => "
+                "sum + part.length, 0), viewer.missing]"
+            )
+            assert held == claimed <= total / 2 and missing == 0
+        assert shown.complaints() == []
+
+
+def test_a_missing_chunk_is_said_and_walked_past(browser, streamed, tmp_path):
+    shutil.copytree(streamed, tmp_path / "v")
+    for chunk in (0, 1, 2):
+        (tmp_path / "v" / f"geometry-{chunk}.js").unlink()
+    (tmp_path / "v" / "geometry-3.js").write_text('viewcellChunks.set(3,"AAAA");')
+    shown = Shown(browser, (tmp_path / "v" / "index.html").as_uri())
+    shown.until("return viewer.ahead.misses >= 4")
+    note = shown.run("return document.getElementById('note').textContent")
+    assert note.endswith("what is drawn is what is there")
+    shown.until(SETTLED)
+    assert shown.run("return viewer.stage.inside.triangles") > 0
+    assert "chunks failed" in shown.run("return document.getElementById('misses').textContent")
+
+
+def test_a_slow_server_shows_what_has_come(browser, streamed):
+    with served(streamed, seconds=0.3) as address:
+        shown = Shown(browser, address)
+        waiting = shown.run("return [viewer.missing, viewer.frames ?? 0]")
+        shown.until("return viewer.missing === 0")
+        assert waiting[0] > 0 and shown.complaints() == []
+
+
+@pytest.mark.slow
+def test_a_long_replay_does_not_grow(browser, streamed):
+    """Half an hour of a walk, sixty times as fast: what is held stays what it was after the first tenth."""
+    made = walked(pack(streamed.with_suffix(".bake")), frames=18_000, seed=1)
+    shown = Shown(browser, (streamed / "index.html").as_uri())
+    shown.choose("view", "inside")
+    shown.run("viewer.choose('pace', 60); viewer.choose('mode', 'eye'); viewer.choose('cache', 0.1);"
+              "viewer.choose('path', arguments[0])", frames_csv(made).decode())  # fmt: skip
+    held = []
+    for share in (0.1, 0.4, 0.7, 0.95):
+        shown.until(f"return !viewer.tour.frames || viewer.tour.t > {share * 1800}", 400)
+        browser.execute_cdp_cmd("HeapProfiler.collectGarbage", {})
+        held.append(shown.run(
+            "return [performance.memory.usedJSHeapSize, viewer.stage.renderer.info.memory.geometries,"
+            "viewer.stage.inside.meshes[0].geometry.attributes.position.count]"
+        ))  # fmt: skip
+    held = np.array(held)
+    assert (held[1:, 0] < 1.25 * held[0, 0] + 4e6).all() and (held[:, 1:] <= held[0, 1:] * 1.5).all(), held
+
+
+def test_through_a_server(browser, folder):
+    with served(folder) as address:
+        assert Shown(browser, address).run("return document.documentElement.dataset.ready") == "1"
 
 
 @pytest.mark.parametrize("what", ["cut", "missing"])

@@ -10,14 +10,14 @@ from viewcell.data.errors import InputError
 from viewcell.workbench.cli import main
 from viewcell.workbench.view import run
 
-FILES = ["data.js", "index.html", "viewer.js", "viewer.js.LEGAL.txt"]
+FILES = ["data.js", "index.html", "viewer.js", "viewer.js.LEGAL.txt", "why.js"]
 
 
 @pytest.fixture(autouse=True)
 def scripts(tmp_path_factory, monkeypatch):
     """Stand-ins for what npm brings."""
     built = tmp_path_factory.mktemp("build")
-    for name in FILES[2:]:
+    for name in FILES[2:4]:
         (built / name).write_text(f"{name} with three.js")
     monkeypatch.setattr(run, "BUILT", built)
 
@@ -25,7 +25,7 @@ def scripts(tmp_path_factory, monkeypatch):
 def test_a_bake_and_its_pack_give_the_same_view(office, walk, tmp_path):
     first, second = viewcell.view(office, tmp_path / "a"), viewcell.view(walk.folder, tmp_path / "b")
     assert sorted(file.name for file in (tmp_path / "a").iterdir()) == FILES
-    for name in FILES[:1] + FILES[2:]:
+    for name in (*FILES[:1], *FILES[2:]):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
     text = first.page.read_text()
     # Nothing is fetched from anywhere.
@@ -104,3 +104,16 @@ def test_a_failure_leaves_the_view_that_was_there(walk, tmp_path, monkeypatch):
         run.view(walk.folder, out, overwrite=True)
     assert {file.name: file.read_bytes() for file in out.iterdir()} == before
     assert not list(tmp_path.glob(".*"))
+
+
+def test_a_large_model_lies_in_chunks(walk, tmp_path, monkeypatch):
+    """Chunks of a view that was there before do not stay."""
+    monkeypatch.setattr(run, "STREAMED", 10_000)
+    out = tmp_path / "v"
+    run.view(walk.folder, out)
+    names = {file.name for file in out.iterdir()} - set(FILES)
+    assert len(names) > 3 and names == {f"geometry-{k}.js" for k in range(len(names))}
+    (out / "geometry-999.js").write_text("of another one")
+    monkeypatch.setattr(run, "STREAMED", 10_000_000)
+    run.view(walk.folder, out, overwrite=True)
+    assert sorted(file.name for file in out.iterdir()) == FILES

@@ -6,16 +6,6 @@ import { decode } from "./runs.mjs";
 // Corners lie on a grid, up to half a step from where they are placed [m].
 const GRID = 1e-3;
 
-/** Least and most of points, 3 numbers each. */
-function boxAround(points) {
-  const box = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
-  points.forEach((x, k) => {
-    box[k % 3] = Math.min(box[k % 3], x);
-    box[3 + (k % 3)] = Math.max(box[3 + (k % 3)], x);
-  });
-  return box;
-}
-
 export class Database {
   constructor(head, arrays) {
     Object.assign(this, arrays);
@@ -28,11 +18,20 @@ export class Database {
     this.rowOfCell = new Map(Array.from(this.viewCells, (cell, row) => [cell, row]));
     this.sets = new Map();
     this.shapes = new Map();
-    this.boxes = new Map();
     this.held = new Map();
     this.reach = new Map();
-    this.around = [];
-    this.itemBoxes = [];
+    this.chunks = this.chunkStarts.length - 1;
+    this.chunkIds = Array.from({ length: this.chunks }, (_, chunk) => chunk);
+    this.chunkOf = new Uint32Array(this.itemOffsets.length);
+    for (const chunk of this.chunkIds) this.chunkOf.fill(chunk, this.chunkStarts[chunk], this.chunkStarts[chunk + 1]);
+    // Bytes of the chunks that are here.
+    this.parts = new Map();
+    if (!head.streams) {
+      for (const chunk of this.chunkIds) {
+        const begin = this.itemOffsets[this.chunkStarts[chunk]];
+        this.parts.set(chunk, this.geometry.subarray(begin, begin + this.chunkBytes(chunk)));
+      }
+    }
     this.triangleCounts = Array.from({ length: this.objects }, (_, id) => this.itemFaces[this.finestOf(id)]);
   }
 
@@ -51,6 +50,25 @@ export class Database {
       this.sets.set(row, { potential: ids("potential"), unknown });
     }
     return this.sets.get(row);
+  }
+
+  /** Members of a cell's set, each an id and the coarsest level that is good enough for it from anywhere in the cell. */
+  membersOf(cell) {
+    const row = this.rowOfCell.get(cell);
+    if (row === undefined) return [];
+    const begin = this.memberStarts[row];
+    return this.setOf(cell).potential.map((id, k) => [id, this.limits[begin + k]]);
+  }
+
+  /** Bytes of a chunk: of the items in it, which lie together. */
+  chunkBytes(chunk) {
+    return this.chunkEnds[chunk] - this.itemOffsets[this.chunkStarts[chunk]];
+  }
+
+  /** Whether an object may be visible from a cell. */
+  isPotential(cell, id) {
+    if (this.members?.cell !== cell) this.members = { cell, ids: new Set(this.setOf(cell)?.potential) };
+    return this.members.ids.has(id);
   }
 
   /** What one may stand on in a cell: those of its potential objects. */
@@ -77,19 +95,49 @@ export class Database {
     return this.reach.get(cell);
   }
 
-  /** Corners and faces of an item: 3 numbers a vertex, 3 a face. */
+  /** Corners and faces of an item that is here: 3 numbers a vertex, 3 a face. */
   item(number) {
-    const begin = this.itemOffsets[number];
+    const chunk = this.chunkOf[number];
+    const bytes = this.parts.get(chunk);
+    const begin = this.itemOffsets[number] - this.itemOffsets[this.chunkStarts[chunk]];
     const [vertices, faces] = [this.itemVertices[number], this.itemFaces[number]];
-    const corners = new Float32Array(this.geometry.slice(begin, begin + 12 * vertices).buffer);
+    const corners = new Float32Array(bytes.slice(begin, begin + 12 * vertices).buffer);
     const wide = vertices > 65536 ? Uint32Array : Uint16Array;
     const at = begin + 12 * vertices;
-    return { corners, faces: new wide(this.geometry.slice(at, at + 3 * faces * wide.BYTES_PER_ELEMENT).buffer) };
+    return { corners, faces: new wide(bytes.slice(at, at + 3 * faces * wide.BYTES_PER_ELEMENT).buffer) };
   }
 
-  /** Triangles of an object in the model, 9 numbers each. */
+  /** The item of an object that is here and nearest to a level: coarser ones first, then finer ones; -1 for none. */
+  itemNear(id, level) {
+    const [begin, end] = [this.itemStarts[id], this.itemStarts[id + 1]];
+    for (let at = begin + level; at < end; at++) if (this.parts.has(this.chunkOf[this.items[at]])) return this.items[at];
+    for (let at = begin + level - 1; at >= begin; at--) if (this.parts.has(this.chunkOf[this.items[at]])) return this.items[at];
+    return -1;
+  }
+
+  /** Items of a chunk. */
+  itemsOf(chunk) {
+    return Array.from({ length: this.chunkStarts[chunk + 1] - this.chunkStarts[chunk] }, (_, k) => this.chunkStarts[chunk] + k);
+  }
+
+  /** Chunks of an object's levels. */
+  chunksOf(id) {
+    return Array.from(this.items.subarray(this.itemStarts[id], this.itemStarts[id + 1]), (item) => this.chunkOf[item]);
+  }
+
+  /** Forget a chunk. */
+  release(chunk) {
+    this.parts.delete(chunk);
+    this.shapes.clear();
+  }
+
+  /** Triangles of an object in the model, 9 numbers each; of the finest level that is here. */
   trianglesOf(id) {
-    if (!this.shapes.has(id)) this.shapes.set(id, this.placed(id));
+    if (!this.shapes.has(id)) {
+      const item = this.itemNear(id, 0);
+      if (item < 0) return new Float32Array(0);
+      this.shapes.set(id, this.placed(id, item));
+    }
     return this.shapes.get(id);
   }
 
@@ -99,7 +147,7 @@ export class Database {
       const box = this.cellBoxes.subarray(6 * cell, 6 * cell + 6);
       const ids = [];
       for (let id = 0; id < this.objects; id++) {
-        const b = this.aroundOf(id);
+        const b = this.boxOf(id);
         if ([0, 1, 2].every((axis) => b[axis] <= box[axis + 3] + GRID && b[axis + 3] >= box[axis] - GRID)) ids.push(id);
       }
       this.held.set(cell, ids);
@@ -107,33 +155,13 @@ export class Database {
     return this.held.get(cell);
   }
 
-  /** A box around an object: around its shape's box where that is placed, so never smaller than the object. */
-  aroundOf(id) {
-    if (!this.around[id]) {
-      const box = this.itemBox(this.finestOf(id));
-      const m = this.transforms.subarray(12 * id, 12 * id + 12);
-      this.around[id] = [0, 1].flatMap((end) => [0, 1, 2].map((row) => {
-        let sum = m[4 * row + 3];
-        for (let k = 0; k < 3; k++) sum += m[4 * row + k] * box[k + (m[4 * row + k] > 0 === (end === 1) ? 3 : 0)];
-        return sum;
-      }));
-    }
-    return this.around[id];
-  }
-
-  itemBox(item) {
-    if (!this.itemBoxes[item]) this.itemBoxes[item] = boxAround(this.item(item).corners);
-    return this.itemBoxes[item];
-  }
-
-  /** Least and most of an object's corners. */
+  /** A box around an object, 6 numbers, the least ones first. */
   boxOf(id) {
-    if (!this.boxes.has(id)) this.boxes.set(id, boxAround(this.trianglesOf(id)));
-    return this.boxes.get(id);
+    return this.objectBoxes.subarray(6 * id, 6 * id + 6);
   }
 
-  placed(id) {
-    const { corners, faces } = this.item(this.finestOf(id));
+  placed(id, item) {
+    const { corners, faces } = this.item(item);
     const m = this.transforms.subarray(12 * id, 12 * id + 12);
     const out = new Float32Array(3 * faces.length);
     faces.forEach((vertex, k) => {

@@ -44,8 +44,9 @@ function beyond(low, high, planes) {
 /** Objects and cells that an eye sees within some planes, or null where there are too many ways.
  *
  * `eye` is a point, `planes` are unit normals that point inwards, `boxOf(id)` gives an object's box, `objectsIn(cell)`
- * those whose boxes meet a cell; `wanted` and `reached` say which objects and cells may be seen at all, or are null. */
-export function eyeSees(maze, eye, planes, boxOf, objectsIn, wanted = null, reached = null) {
+ * those whose boxes meet a cell; `wanted` and `reached` say which objects and cells may be seen at all, or are null;
+ * `passed(polygon)` hears of what of each portal is in sight, as corners about the eye. */
+export function eyeSees(maze, eye, planes, boxOf, objectsIn, wanted = null, reached = null, passed = null) {
   const objects = new Set();
   const cells = new Set();
   const before = new Set();
@@ -68,7 +69,8 @@ export function eyeSees(maze, eye, planes, boxOf, objectsIn, wanted = null, reac
       const behind = maze.sides[2 * portal + (up ? 1 : 0)];
       if (before.has(behind) || (reached && !reached.has(behind))) continue;
       const narrower = through(maze, portal, up, eye, own);
-      if (narrower && !look(behind, narrower)) return false;
+      if (narrower?.polygon && passed) passed(narrower.polygon);
+      if (narrower && !look(behind, narrower.planes)) return false;
     }
     before.delete(cell);
     return true;
@@ -98,7 +100,7 @@ function through(maze, portal, up, eye, planes) {
   if (ahead <= SLACK) {
     // From within a portal all of what lies on its other side is in sight.
     const inside = eye[u] >= lowU - SLACK && eye[u] <= highU + SLACK && eye[v] >= lowV - SLACK && eye[v] <= highV + SLACK;
-    return inside ? planes : null;
+    return inside ? { planes } : null;
   }
   let polygon = [[lowU, lowV], [highU, lowV], [highU, highV], [lowU, highV]].map(([a, b]) => {
     const corner = [0, 0, 0];
@@ -108,5 +110,5 @@ function through(maze, portal, up, eye, planes) {
   for (const normal of planes) polygon = clip(polygon, normal);
   if (!polygon.length) return null;
   const found = polygon.length < 3 ? [] : planesAround(polygon);
-  return found.length < 3 ? planes : found;
+  return { planes: found.length < 3 ? planes : found, polygon };
 }

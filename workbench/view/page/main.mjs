@@ -1,15 +1,23 @@
 // The viewer: walk through a display database, from inside and from above.
 
+import { Ahead } from "./ahead.mjs";
 import { Database } from "./database.mjs";
 import { eyeSees } from "./eye.mjs";
+import { Inquiry } from "./inquiry.mjs";
 import { Keys } from "./keys.mjs";
+import { Labels } from "./labels.mjs";
+import { Levels } from "./levels.mjs";
+import { Numbers } from "./numbers.mjs";
 import { Panel } from "./panel.mjs";
 import { Stage } from "./stage.mjs";
+import { Files, Inline } from "./supply.mjs";
+import { Tour, download } from "./tour.mjs";
 import { arraysOf, unpacked } from "./unpack.mjs";
 import { Visitor } from "./visitor.mjs";
 
 const VIEWS = ["inside", "both", "above"];
 const MODES = ["set", "eye", "whole"];
+const COLOURS = ["verdicts", "memory", "levels", "backs", "model"];
 // Seconds that a frame may count for: what a hidden tab misses is not walked.
 const LONGEST = 0.1;
 
@@ -19,12 +27,30 @@ class Viewer {
     this.visitor = new Visitor(database);
     this.canvas = document.getElementById("canvas");
     this.stage = new Stage(this.canvas, database);
-    this.chosen = { view: "both", mode: "set", verdicts: true, outlines: false };
+    this.levels = new Levels(database);
+    this.numbers = new Numbers(document.getElementById("plot"));
+    this.chosen = {
+      view: "both", mode: "set", colours: "verdicts", outlines: false, wedge: false, labels: true, freeze: false, speed: this.visitor.speed, target: 0, cache: 64, pace: 1,
+    };
     const [low, high] = [this.stage.bounds[2], this.stage.bounds[5] + 0.1];
-    this.panel = new Panel(database.rooms(), [low, high], (name, value) => this.choose(name, value));
-    for (const [name, value] of Object.entries(this.chosen)) this.panel.set(name, value);
+    this.panel = new Panel(database, [low, high], (name, value) => this.choose(name, value));
+    this.ahead = new Ahead(database, new (database.head.streams ? Files : Inline)(database), this.chosen.cache * 1e6, {
+      arrived: () => (this.restage = true),
+      gone: (items) => this.gone(items),
+      failed: (error) => this.panel.note(`${error.message}: what is drawn is what is there`),
+    });
+    this.tour = new Tour(database, (text) => this.panel.note(text));
+    this.keys = new Keys(this.canvas, this.visitor, (code) => this.pressed(code), (x, y) => this.why(x, y));
+    this.inquiry = new Inquiry(database, this.stage, this.panel, () => (this.stale = true));
+    for (const [name, value] of Object.entries(this.chosen)) this.choose(name, value);
     this.choose("height", this.storeyTop());
-    this.keys = new Keys(this.canvas, this.visitor, (code) => this.pressed(code));
+    this.labels = new Labels(document.getElementById("labels-over"), database);
+    this.listen();
+    this.last = performance.now();
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  listen() {
     this.canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
       this.stage.zoom(Math.exp(event.deltaY * 0.001));
@@ -36,14 +62,11 @@ class Viewer {
     addEventListener("resize", () => (this.stale = true));
     const dark = matchMedia("(prefers-color-scheme: dark)");
     const dress = () => {
-      this.stage.dress(dark.matches ? 0x10161b : 0xdfe9f1);
+      this.stage.dress(dark.matches ? [0x10161b, 0x20282c] : [0xdfe9f1, 0xc9cfc0]);
       this.stale = true;
     };
     dark.addEventListener("change", dress);
     dress();
-    this.times = [];
-    this.last = performance.now();
-    requestAnimationFrame((now) => this.frame(now));
   }
 
   isSky(event) {
@@ -58,31 +81,80 @@ class Viewer {
   }
 
   pressed(code) {
-    if (code === "KeyV") this.choose("view", VIEWS[(VIEWS.indexOf(this.chosen.view) + 1) % 3]);
-    if (code === "KeyM") this.choose("mode", MODES[(MODES.indexOf(this.chosen.mode) + 1) % 3]);
+    const next = (name, values) => this.choose(name, values[(values.indexOf(this.chosen[name]) + 1) % values.length]);
+    if (code === "KeyV") next("view", VIEWS);
+    if (code === "KeyM") next("mode", MODES);
+    if (code === "KeyC") next("colours", COLOURS);
+    if (code === "KeyN") this.choose("labels", !this.chosen.labels);
+    if (code === "KeyG") this.choose("wedge", !this.chosen.wedge);
+    if (code === "Minus" || code === "Equal") this.stage.zoom(code === "Minus" ? 1.15 : 1 / 1.15);
+    if (code === "KeyQ" || code === "KeyE") this.stage.swing(code === "KeyQ" ? -40 : 40, 0);
+    if (code === "BracketLeft" || code === "BracketRight") this.choose("height", this.chosen.height + (code === "BracketLeft" ? -0.3 : 0.3));
     if (code === "KeyO") this.choose("outlines", !this.chosen.outlines);
-    if (code === "KeyC") this.choose("verdicts", !this.chosen.verdicts);
+    if (code === "KeyF") this.choose("freeze", !this.chosen.freeze);
+    if (code === "KeyR") this.choose("record");
+    if (code === "KeyY") this.why(this.canvas.clientWidth / (this.chosen.view === "both" ? 4 : 2), this.canvas.clientHeight / 2);
+    if (code === "Escape") {
+      this.inquiry.ask(null);
+      this.tour.stop();
+    }
+  }
+
+  /** Ask why one sees what is at a place of the picture; a second time on it, why one sees the room there. */
+  why(x, y) {
+    const found = this.stage.pick(x, y, this.chosen.view);
+    const { asked } = this.inquiry;
+    const again = found && asked?.kind === "object" && asked.id === found.id;
+    const room = again ? this.database.maze.cellAt([found.point[0], found.point[1], found.point[2] + 0.5]) : -1;
+    return this.inquiry.ask(found && (room >= 0 ? { kind: "cell", id: room } : { kind: "object", id: found.id }));
   }
 
   /** Take a choice: of the panel, a key, or a test. */
   choose(name, value) {
-    if (name === "cell") {
-      this.visitor.goTo(value);
-      this.choose("height", this.storeyTop());
-    } else {
-      this.chosen[name] = name === "height" ? Number(value) : value;
+    const actions = {
+      object: () => this.inquiry.ask({ kind: "object", id: value }),
+      room: () => this.inquiry.ask({ kind: "cell", id: value }),
+      cell: () => {
+        this.visitor.goTo(value);
+        this.choose("height", this.storeyTop());
+      },
+      path: () => this.tour.play(value),
+      stop: () => this.tour.stop(),
+      record: () => {
+        const text = this.tour.record(performance.now());
+        if (text) download("path.csv", text);
+        this.panel.recording(this.tour.recording);
+      },
+    };
+    if (actions[name]) actions[name]();
+    else {
+      this.chosen[name] = typeof this.chosen[name] === "number" || name === "height" ? Number(value) : value;
       this.panel.set(name, value);
+    }
+    const { chosen } = this;
+    if (name === "freeze") this.frozen = value ? this.stage.hold(this.visitor) : this.stage.hold(null);
+    if (name === "speed") this.visitor.speed = chosen.speed;
+    if (name === "pace") this.tour.speed = chosen.pace;
+    if (name === "target") this.levels.target = chosen.target;
+    if (name === "cache") {
+      this.ahead.memory.capacity = chosen.cache * 1e6;
+      this.ahead.stale = true;
     }
     this.cell = undefined;
     this.stale = true;
   }
 
+  /** Who looks: the visitor, or where they were when the view was frozen. */
+  get observer() {
+    return this.frozen ?? this.visitor;
+  }
+
   /** What the eye sees of its cell's set, as an array of 0 and 1; or all of the set where that cannot be told. */
-  sight(shown) {
-    const { database, visitor, stage } = this;
+  sight(shown, passed = null) {
+    const { database, observer, stage } = this;
     const found = database.maze.axes.length
-      ? eyeSees(database.maze, visitor.point, stage.planes(), (id) => database.aroundOf(id),
-        (cell) => database.objectsIn(cell), shown, database.reachOf(visitor.cell))
+      ? eyeSees(database.maze, observer.point, stage.planes(), (id) => database.boxOf(id),
+        (cell) => database.objectsIn(cell), shown, database.reachOf(observer.cell), passed)
       : null;
     if (!found) return shown;
     const out = new Uint8Array(database.objects);
@@ -90,68 +162,124 @@ class Viewer {
     return out;
   }
 
-  /** Show what the eye sees and nothing else. */
-  look() {
-    this.stage.aim(this.visitor, this.chosen.view);
-    const shown = this.sight(this.kept);
-    this.stage.inside.show(shown);
-    this.tell(Array.from(shown.keys()).filter((id) => shown[id]));
-  }
-
-  /** Bring what is shown up to where the visitor is. */
+  /** Bring what is shown up to where the observer is. */
   enter() {
-    const { database, visitor, stage, chosen } = this;
-    const set = database.setOf(visitor.cell);
+    const { database, observer, stage, chosen } = this;
+    const set = database.setOf(observer.cell);
     const potential = set ? set.potential : Array.from({ length: database.objects }, (_, id) => id);
-    const shown = new Uint8Array(database.objects).fill(chosen.mode === "whole" ? 1 : 0);
-    for (const id of potential) shown[id] = 1;
-    this.kept = shown;
-    const verdicts = new Array(database.objects).fill("hidden");
-    for (const id of potential) verdicts[id] = !set || set.unknown.has(id) ? "unknown" : "seen";
-    stage.show(shown, chosen.verdicts ? verdicts : null);
-    const near = (chosen.outlines && database.reachOf(visitor.cell)) || new Set();
+    this.kept = new Uint8Array(database.objects).fill(chosen.mode === "whole" ? 1 : 0);
+    for (const id of potential) this.kept[id] = 1;
+    this.verdicts = new Array(database.objects).fill("hidden");
+    for (const id of potential) this.verdicts[id] = !set || set.unknown.has(id) ? "unknown" : "seen";
+    const near = (chosen.outlines && database.reachOf(observer.cell)) || new Set();
     const { sides, axes } = database.maze;
     const portals = Array.from(axes, (_, k) => k).filter((k) => near.has(sides[2 * k]) && near.has(sides[2 * k + 1]));
-    stage.outline(visitor.cell, [...near], portals);
-    this.tell(chosen.mode === "whole" ? null : potential);
-    this.cell = visitor.cell;
+    stage.outline(observer.cell, [...near], portals);
+    this.look();
+    stage.all(chosen.colours);
+    this.colour();
+    this.cell = observer.cell;
   }
 
-  /** Say where the visitor is, and how much is drawn: these objects, or all. */
-  tell(drawn) {
-    const { database, visitor } = this;
-    const set = database.setOf(visitor.cell);
+  /** Show what is kept, or what the eye sees of it, at the levels that are chosen and here. */
+  look() {
+    const { database, stage, observer, levels } = this;
+    if (!this.frozen) stage.aim(this.visitor, this.chosen.view);
+    const shown = this.chosen.mode === "eye" ? this.sight(this.kept) : this.kept;
+    if (this.chosen.wedge) {
+      const polygons = [];
+      this.sight(this.kept, (polygon) => polygons.push(polygon));
+      stage.wedge(observer.point, polygons);
+    } else stage.wedge(observer.point, []);
+    const focal = stage.focal();
+    this.wanted = [];
+    const coarsest = [];
+    let missing = 0;
+    const itemOf = (id) => {
+      const level = levels.of(id, observer.point, focal);
+      this.wanted.push(database.items[database.itemStarts[id] + level]);
+      coarsest.push(database.items[database.itemStarts[id + 1] - 1]);
+      const item = database.itemNear(id, level);
+      if (item < 0) missing++;
+      return item;
+    };
+    stage.inside.show(shown, itemOf);
+    this.wanted = [...coarsest, ...this.wanted];
+    this.missing = missing;
+    this.restage = false;
+    this.tell(shown);
+  }
+
+  /** Colours, of the view from above or, for levels, of both. */
+  colour() {
+    const { stage, chosen, ahead, verdicts } = this;
+    stage.colour(chosen.colours, { verdicts, stateOf: (id) => ahead.stateOf(id, performance.now()) });
+    stage.range(chosen.colours === "memory" ? ahead.cells : []);
+  }
+
+  /** Chunks that are no longer held: nothing is drawn of them. */
+  gone(items) {
+    this.stage.drop(items);
+    this.restage = true;
+  }
+
+  /** Say where the observer is, and how much is drawn. */
+  tell(shown) {
+    const { database, observer, ahead } = this;
+    const set = database.setOf(observer.cell);
     const count = (number) => number.toLocaleString("en");
+    const drawn = shown.reduce((sum, one) => sum + one, 0);
     const sum = (ids) => ids.reduce((all, id) => all + database.triangleCounts[id], 0);
     const whole = this.whole ??= database.triangleCounts.reduce((all, one) => all + one, 0);
-    const [here, potential] = [drawn?.length ?? database.objects, set?.potential.length ?? database.objects];
-    const cell = visitor.cell;
+    const potential = set?.potential.length ?? database.objects;
+    const { cell } = observer;
     const name = cell < 0 ? "outside all cells" : `cell ${database.cellIds[cell]} ${database.head.cellNames[cell]}`;
-    this.counts = { drawn: here, potential, objects: database.objects };
+    this.triangles = this.stage.inside.triangles;
+    this.counts = { drawn, potential, objects: database.objects };
+    if (this.potentialOf !== cell) [this.potentialOf, this.potentialTriangles] = [cell, set ? sum(set.potential) : whole];
     this.panel.say({
       cell: set ? name : `${name}: no view cell, so everything is kept`,
-      drawn: `${count(here)} drawn, ${count(potential)} potential (${set ? set.unknown.size : "all"} unknown), of ${count(database.objects)}`,
-      triangles: `${count(drawn ? sum(drawn) : whole)} of ${count(whole)}`,
+      drawn: `${count(drawn)} drawn, ${count(potential)} potential (${set ? set.unknown.size : "all"} unknown), of ${count(database.objects)}`,
+      triangles: `${count(this.triangles)} drawn, ${count(this.potentialTriangles)} potential, of ${count(whole)}`,
+      levels: this.levels.target ? `within ${this.levels.tolerance.toFixed(1)} pixels` : "the finest",
+    });
+    const bytes = (number) => `${(number / 1e6).toFixed(number < 1e7 ? 2 : 0)} MB`;
+    const { memory } = ahead;
+    this.panel.say({
+      memory: `${bytes(memory.claimed)} held, ${bytes(memory.fetched)} fetched${ahead.supply.streams ? "" : " as it would be"}`,
+      misses: `${count(this.missing)} objects not yet here, ${count(ahead.misses)} chunks failed`,
     });
   }
 
   frame(now) {
-    const seconds = Math.min(LONGEST, (now - this.last) / 1000);
+    // A frame's time may be from before the page was ready.
+    const elapsed = Math.max(0, now - this.last);
+    const seconds = Math.min(LONGEST, elapsed / 1000);
     this.last = now;
     const before = this.visitor.point.join();
-    const asked = this.keys.tick(seconds);
-    if (this.cell !== this.visitor.cell) {
-      if (this.cell !== undefined) this.choose("height", this.storeyTop());
+    const replays = this.tour.tick(this.visitor, seconds);
+    const asked = replays || this.keys.tick(seconds);
+    this.tour.recorder?.tick(this.visitor, now);
+    if (this.cell !== this.observer.cell) {
+      if (this.cell !== undefined && !this.frozen) this.choose("height", this.storeyTop());
       this.enter();
       this.stale = true;
     }
+    this.inquiry.enter(this.cell);
+    this.ahead.look(this.observer.point, this.observer.cell, this.wanted, now);
     const turned = `${this.visitor.yaw} ${this.visitor.pitch} ${JSON.stringify(this.stage.orbit)}`;
-    if (this.stale || asked || before !== this.visitor.point.join() || turned !== this.turned) {
-      const start = performance.now();
-      if (this.chosen.mode === "eye") this.look();
+    const moves = asked || before !== this.visitor.point.join() || turned !== this.turned;
+    if (this.stale || this.restage || moves || (this.chosen.colours === "memory" && this.ahead.fades(now))) {
+      if (this.restage) this.stage.all(this.chosen.colours);
+      const again = moves && this.levels.heard(elapsed);
+      if (this.restage || again || (moves && (this.chosen.mode === "eye" || this.chosen.wedge || this.levels.target))) this.look();
+      if (this.chosen.colours === "memory" || this.chosen.colours === "levels") this.colour();
       this.stage.draw(this.visitor, this.chosen.view, this.chosen.height);
-      this.times = [...this.times.slice(-29), performance.now() - start];
-      this.panel.say({ rate: `${(this.times.reduce((a, b) => a + b) / this.times.length).toFixed(1)} ms a frame on the processor` });
+      const { left, width } = this.stage.skyPart(this.chosen.view);
+      this.labels.draw(this.stage.sky, left, this.chosen.labels ? width : 0, this.canvas.clientHeight, this.chosen.height);
+      if (moves) this.numbers.add(elapsed, this.triangles);
+      this.panel.say({ rate: `${this.numbers.rate.toFixed(0)} frames a second` });
+      this.panel.plot(this.numbers, this.levels.target);
       this.turned = turned;
       this.stale = false;
       this.frames = (this.frames ?? 0) + 1;

@@ -9,10 +9,26 @@ export class Maze {
   constructor({ boxes, plans, inhabitable, sides, axes, coordinates, openings }) {
     Object.assign(this, { boxes, plans, inhabitable, sides, axes, coordinates, openings });
     this.count = boxes.length / 6;
+    this.portalBoxes = [];
     this.portals = Array.from({ length: this.count }, () => []);
     for (let portal = 0; portal < axes.length; portal++) {
       for (const side of [0, 1]) this.portals[sides[2 * portal + side]].push(portal);
     }
+  }
+
+  /** The box of a portal, flat along its axis. */
+  portalBox(portal) {
+    if (!this.portalBoxes[portal]) {
+      const box = [0, 0, 0, 0, 0, 0];
+      const axis = this.axes[portal];
+      box[axis] = box[axis + 3] = this.coordinates[portal];
+      [0, 1, 2].filter((other) => other !== axis).forEach((other, k) => {
+        box[other] = this.openings[4 * portal + 2 * k];
+        box[other + 3] = this.openings[4 * portal + 2 * k + 1];
+      });
+      this.portalBoxes[portal] = box;
+    }
+    return this.portalBoxes[portal];
   }
 
   /** Whether a point is in a cell, borders included. */

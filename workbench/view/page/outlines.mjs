@@ -14,24 +14,16 @@ export function boxLines(boxes) {
   return new Float32Array(out);
 }
 
-/** The boxes of some portals, flat along their axis: 6 numbers each. */
+/** The boxes of some portals: 6 numbers each. */
 export function portalBoxes(maze, portals) {
-  return portals.flatMap((portal) => {
-    const box = [0, 0, 0, 0, 0, 0];
-    const axis = maze.axes[portal];
-    box[axis] = box[axis + 3] = maze.coordinates[portal];
-    [0, 1, 2].filter((other) => other !== axis).forEach((other, k) => {
-      box[other] = maze.openings[4 * portal + 2 * k];
-      box[other + 3] = maze.openings[4 * portal + 2 * k + 1];
-    });
-    return box;
-  });
+  return portals.flatMap((portal) => maze.portalBox(portal));
 }
 
-/** Lines of a colour on a layer, none at first. */
+/** Lines of a colour on a layer, none at first; `through` all that is before them. */
 export class Lines {
-  constructor(colour, layer, planes = []) {
-    this.mesh = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: colour, clippingPlanes: planes }));
+  constructor(colour, layer, planes = [], through = false) {
+    const material = new LineBasicMaterial({ color: colour, clippingPlanes: planes, depthTest: !through, transparent: through });
+    this.mesh = new LineSegments(new BufferGeometry(), material);
     this.mesh.layers.set(layer);
     this.mesh.frustumCulled = false;
   }

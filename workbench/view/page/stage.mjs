@@ -1,12 +1,13 @@
 // What is drawn: the model from inside and from above, each with a camera and layers of its own.
 
 import {
-  Color, DirectionalLight, HemisphereLight, MathUtils, Mesh, MeshBasicMaterial, PerspectiveCamera, Plane,
-  Scene, SphereGeometry, Vector3, WebGLRenderer,
+  CircleGeometry, Color, DirectionalLight, HemisphereLight, MathUtils, Mesh, MeshBasicMaterial, PerspectiveCamera, Plane, Raycaster,
+  Scene, SphereGeometry, Vector2, Vector3, WebGLRenderer,
 } from "three";
 
 import { Batch } from "./batch.mjs";
-import { VERDICTS, rgb } from "./colours.mjs";
+import { MEMORY, VERDICTS, levelColour, rgb } from "./colours.mjs";
+import { Marks } from "./marks.mjs";
 import { Lines, boxLines, portalBoxes } from "./outlines.mjs";
 
 export const [INSIDE, ABOVE] = [0, 1];
@@ -36,9 +37,19 @@ export class Stage {
     this.orbit = { turn: -0.9, rise: 0.9, away: 1.15 * this.size() };
     this.light();
     this.head = new Mesh(new SphereGeometry(0.35), new MeshBasicMaterial({ color: 0xd55e00 }));
-    this.lines = { frustum: new Lines(0xd55e00, ABOVE), cell: new Lines(0xd55e00, ABOVE), cells: new Lines(0x0072b2, ABOVE, [this.cut]), portals: new Lines(0x007a58, ABOVE, [this.cut]) };
+    const lines = { frustum: 0xd55e00, cell: 0xd55e00, cells: 0x0072b2, range: 0x0072b2, portals: 0x007a58, wedge: 0xcc79a7 };
+    const whole = ["frustum", "cell", "wedge"];
+    this.lines = Object.fromEntries(Object.entries(lines).map(([name, colour]) =>
+      [name, new Lines(colour, ABOVE, whole.includes(name) ? [] : [this.cut])]));
+    this.marks = new Marks(database.maze, [INSIDE, ABOVE], INSIDE);
+    this.scene.add(this.marks.group);
     this.head.layers.set(ABOVE);
-    this.scene.add(this.head, ...Object.values(this.lines).map((one) => one.mesh));
+    this.land = new Mesh(new CircleGeometry(4 * this.size(), 64), new MeshBasicMaterial({ color: 0xc9cfc0 }));
+    const b = this.bounds;
+    // A little below the model, lest the two fight for pixels.
+    this.land.position.set((b[0] + b[3]) / 2, (b[1] + b[4]) / 2, b[2] - 0.002 * this.size());
+    this.land.layers.enable(ABOVE);
+    this.scene.add(this.land, this.head, ...Object.values(this.lines).map((one) => one.mesh));
   }
 
   size() {
@@ -54,15 +65,75 @@ export class Stage {
     this.scene.add(sky, sun);
   }
 
-  /** Colours of what is behind everything. */
-  dress(paper) {
-    this.scene.background = new Color(paper);
+  /** Colours of the sky and of the ground. */
+  dress([sky, land]) {
+    this.scene.background = new Color(sky);
+    this.land.material.color.set(land);
   }
 
-  /** Show a set from inside, an array of 0 and 1; and from above what is `seen`, `unknown` and `hidden`, if asked for. */
-  show(shown, verdicts) {
-    this.inside.show(shown);
-    this.above.paint(verdicts ? (id) => rgb(VERDICTS[verdicts[id]]) : () => null);
+  /** Draw from an eye to what of portals is in its sight. */
+  wedge(eye, polygons) {
+    const ends = polygons.flatMap((polygon) => polygon.flatMap((corner, k) =>
+      [[0, 0, 0], corner, corner, polygon[(k + 1) % polygon.length]].flatMap((point) => point.map((x, axis) => x + eye[axis]))));
+    this.lines.wedge.set(new Float32Array(ends));
+  }
+
+  /** Where on the page the view from above is. */
+  skyPart(view) {
+    const width = this.canvas.clientWidth;
+    const left = { inside: width, both: Math.floor(width / 2), above: 0 }[view];
+    return { left, width: width - left };
+  }
+
+  /** Show all there is from above: at the levels of the view from inside where they are asked for, else as fine as is here. */
+  all(colours) {
+    const { database, inside, above } = this;
+    this.every ??= new Uint8Array(database.objects).fill(1);
+    above.show(this.every, (id) => (colours === "levels" && inside.shown[id] ? inside.items[id] : this.fit(id)));
+  }
+
+  /** What is looked at from afar: of a model that streams, the coarsest level. */
+  fit(id) {
+    const { database } = this;
+    return database.itemNear(id, database.head.streams ? database.itemStarts[id + 1] - database.itemStarts[id] - 1 : 0);
+  }
+
+  /** Colour by verdicts, memory or levels, or as the model is; `verdicts` by id, `stateOf(id)` in memory. */
+  colour(colours, { verdicts, stateOf }) {
+    const { above, inside, database } = this;
+    const level = (id) => database.items.indexOf(inside.items[id], database.itemStarts[id]) - database.itemStarts[id];
+    const hidden = rgb(VERDICTS.hidden);
+    const of = {
+      verdicts: (id) => rgb(VERDICTS[verdicts[id]]),
+      memory: (id) => rgb(MEMORY[stateOf(id)]),
+      levels: (id) => (inside.shown[id] ? levelColour(level(id)) : hidden),
+    }[colours];
+    for (const batch of [above, inside]) batch.markBacks(colours === "backs");
+    above.paint(of ?? (() => null));
+    if (colours === "levels" || this.painted) inside.paint(colours === "levels" ? of : () => null);
+    this.painted = colours === "levels";
+  }
+
+  /** Lines around cells in range. */
+  range(cells) {
+    this.lines.range.set(boxLines(cells.flatMap(([cell]) => [...this.database.cellBoxes.subarray(6 * cell, 6 * cell + 6)])));
+  }
+
+  /** Items are no longer in memory. */
+  drop(items) {
+    this.inside.drop(items);
+    this.above.drop(items);
+  }
+
+  /** Pixels of a metre at a metre. */
+  focal() {
+    return this.canvas.clientHeight / 2 / Math.tan((FOV * Math.PI) / 360);
+  }
+
+  /** Keep what a visitor sees for the eye's frustum while they walk on, and give a copy of them; or go on, for null. */
+  hold(visitor) {
+    this.held = visitor && this.eye.clone();
+    return visitor && { point: [...visitor.point], cell: visitor.cell };
   }
 
   /** Lines around a cell, and, if asked for, cells that may be seen from it and all their portals. */
@@ -93,7 +164,7 @@ export class Stage {
 
   /** Ways from the eye to the corners of its picture, anticlockwise. */
   corners() {
-    const { eye } = this;
+    const eye = this.held ?? this.eye;
     const at = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
     return at.map(([x, y]) => new Vector3(x, y, 0.5).unproject(eye).sub(eye.position).normalize());
   }
@@ -109,7 +180,7 @@ export class Stage {
     }
     this.cut.constant = height;
     this.aim(visitor, view);
-    head.position.copy(eye.position);
+    head.position.copy((this.held ?? eye).position);
     if (view !== "above") this.lines.frustum.set(this.frustum());
     const { turn, rise, away } = this.orbit;
     const middle = view === "both" ? visitor.point : [0, 1, 2].map((k) => (this.bounds[k] + this.bounds[k + 3]) / 2);
@@ -126,6 +197,23 @@ export class Stage {
     if (view !== "inside") this.part(sky, left, rest, depth);
   }
 
+  /** The object at a place of the page's picture and the point of it there, of those that are drawn; or null. */
+  pick(x, y, view) {
+    const { canvas, eye, sky } = this;
+    const half = view === "both" ? Math.floor(canvas.clientWidth / 2) : canvas.clientWidth;
+    const above = view === "above" || x >= half;
+    const [left, width] = above && view === "both" ? [half, canvas.clientWidth - half] : [0, half];
+    const caster = new Raycaster();
+    caster.layers.set(above ? ABOVE : INSIDE);
+    const at = new Vector2(2 * (x - left) / width - 1, 1 - 2 * y / canvas.clientHeight);
+    caster.setFromCamera(at, above ? sky : eye);
+    const batch = above ? this.above : this.inside;
+    const hits = caster.intersectObjects(batch.meshes, false).filter(({ point }) => !above || point.z <= this.cut.constant);
+    // What one sees through is asked for only where nothing is behind it.
+    const hit = hits.find(({ object }) => object === batch.meshes[0]) ?? hits[0];
+    return hit ? { id: batch.idOf(hit.object, hit.batchId), point: hit.point.toArray() } : null;
+  }
+
   part(camera, left, width, depth) {
     const { renderer } = this;
     renderer.setViewport(left, 0, width, depth);
@@ -137,7 +225,7 @@ export class Stage {
 
   /** Edges of what the eye's picture shows, as far as REACH, 6 numbers each. */
   frustum() {
-    const { eye } = this;
+    const eye = this.held ?? this.eye;
     const corners = this.corners().map((way) => way.multiplyScalar(REACH).add(eye.position).toArray());
     const middle = eye.position.toArray();
     return new Float32Array(corners.flatMap((corner, k) => [...middle, ...corner, ...corner, ...corners[(k + 1) % 4]]));

@@ -14,6 +14,7 @@ export class Visitor {
   constructor(database) {
     this.database = database;
     this.yaw = this.pitch = 0;
+    this.speed = SPEED;
     this.goTo(busiest(database));
   }
 

@@ -64,3 +64,14 @@ test("too many ways are told", () => {
   });
   assert.equal(eyeSees(maze, [0, 0, 0.5], [], () => [], () => []), null);
 });
+
+test("what of portals is in sight is told, as corners about the eye", () => {
+  const maze = new Maze({
+    boxes: Float32Array.from([0, 0, 0, 4, 4, 3, 4, 0, 0, 8, 4, 3]), plans: new Float32Array(16).fill(NaN),
+    inhabitable: Uint8Array.from([1, 1]), sides: Int32Array.from([0, 1]), axes: Uint8Array.from([0]),
+    coordinates: Float32Array.from([4]), openings: Float32Array.from([1, 2, 0, 2]),
+  });
+  const told = [];
+  eyeSees(maze, [3, 1.5, 1], [[1, 0, 0]], () => [], () => [], null, null, (polygon) => told.push(polygon));
+  assert.deepEqual(told, [[[1, -0.5, -1], [1, 0.5, -1], [1, 0.5, 1], [1, -0.5, 1]]]);
+});
