@@ -248,7 +248,7 @@ class _Judge:
 
 def _inverse(depth: np.ndarray) -> np.ndarray:
     """Of depths; an eye on a surface is at none."""
-    return 1 / np.maximum(depth, np.finfo(np.float64).tiny)
+    return 1 / np.maximum(depth, 1e-9)
 
 
 def _cast(scene: EmbreeScene | None, origins: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

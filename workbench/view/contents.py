@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from ...data.ragged import starts_of
+from ...data.runs import encode
 from ...data.scene import Role
 from ...data.store.scene_tables import BOX_COLUMNS
 from ...data.store.walk_folder import GEOMETRY, WalkFolder
@@ -38,7 +39,14 @@ def contents(walk: WalkFolder, *, streams: bool = False) -> str:
         InputError: a table is unreadable, or geometry is cut short.
     """
     kinds, kind = np.unique(walk.objects["kind"].to_pylist(), return_inverse=True)
-    arrays = {"kinds": kind.astype(np.uint16), **_objects(walk), **_items(walk), **_sets(walk), **_cells(walk)}
+    arrays = {
+        "kinds": kind.astype(np.uint16),
+        **_objects(walk),
+        **_items(walk),
+        **_sets(walk),
+        **_cells(walk),
+        **_depth(walk),
+    }
     if streams:
         del arrays["geometry"]
     head = {
@@ -126,7 +134,40 @@ def _items(walk: WalkFolder) -> dict[str, np.ndarray]:
     ends = (walk.items["offset"].to_numpy() + walk.items["size"].to_numpy()).astype(np.int64)
     starts = chunk_starts(found["itemOffsets"].astype(np.int64), ends)
     found |= {"chunkStarts": starts.astype(np.uint32), "chunkEnds": ends[starts[1:] - 1].astype(np.uint32)}
-    return found | {"geometry": np.frombuffer((walk.folder / GEOMETRY).read_bytes(), np.uint8)}
+    whole = np.fromfile(walk.folder / GEOMETRY, np.uint8, geometry_bytes(walk))
+    return found | {"geometry": whole}
+
+
+def geometry_bytes(walk: WalkFolder) -> int:
+    """Of levels of detail; depth meshes come after them."""
+    ends = walk.items["offset"].to_numpy() + walk.items["size"].to_numpy()
+    return int(ends.max(initial=0))
+
+
+def _depth(walk: WalkFolder) -> dict[str, np.ndarray]:
+    """Which view cells have depth meshes, and what stands on them."""
+    index = walk.depth_meshes
+    rows = {int(cell): row for row, cell in enumerate(walk.cells["cell_id"].to_pylist())}
+    return {
+        "depthCells": np.array([rows[cell] for cell in index.cells.tolist()], np.int32),
+        "depthMiddles": index.middles.astype(np.float32),
+        "depthReaches": index.reaches.astype(np.float32),
+        "depthErrors": index.errors.astype(np.float32),
+        "depthFaces": index.faces.sum(axis=1).astype(np.uint32),
+        **_codes("depthFar", encode(*index.far.ids())),
+    }
+
+
+def depth_scripts(walk: WalkFolder) -> Iterator[str]:
+    """Scripts that hand the depth meshes of view cells to the viewer, in order."""
+    index = walk.depth_meshes
+    with (walk.folder / GEOMETRY).open("rb") as file:
+        for row in range(len(index)):
+            faces = []
+            for offset, size in zip(index.offsets[row].tolist(), index.sizes[row].tolist(), strict=True):
+                file.seek(offset)
+                faces.append(base64.b64encode(file.read(size)).decode())
+            yield f"viewcellDepth.set({row},{json.dumps(faces)});\n"
 
 
 def chunks(walk: WalkFolder) -> Iterator[str]:

@@ -14,11 +14,11 @@ from ...data.errors import InputError
 from ...data.progress import phase
 from ...data.store.bake_folder import read_bake
 from ...data.store.scene_folder import held_manifest
-from ...data.store.walk_folder import GEOMETRY, KIND, read_walk
+from ...data.store.walk_folder import KIND, read_walk
 from ..files import write_files
 from ..pack.run import pack
 from ..pages import fill
-from .contents import chunks, contents, script
+from .contents import chunks, contents, depth_scripts, geometry_bytes, script
 from .reasons import reasons
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ LARGEST = 200_000_000
 # With more geometry than this it is read in chunks, as it is looked ahead to [bytes].
 STREAMED = 8_000_000
 CHUNK = "geometry-{}.js"
+DEPTH = "depth-{}.js"
 
 NO_REASONS = script("viewcellReasons", {"certified": None}, {})
 
@@ -87,7 +88,7 @@ def view(
     _check_place(out, overwrite)
     with phase("view"), tempfile.TemporaryDirectory() as scratch:
         walk = read_walk(folder) if packed else pack(folder, Path(scratch) / f"{folder.stem}.walk")
-        streams = (walk.folder / GEOMETRY).stat().st_size > STREAMED
+        streams = geometry_bytes(walk) > STREAMED
         data, why = contents(walk, streams=streams), _reasons(folder, walk, packed)
         if len(data) > LARGEST:
             raise InputError(
@@ -97,8 +98,9 @@ def view(
         page = fill(PAGE, "index.html", title=folder.stem, own=own)
         texts = {"data.js": data.encode(), "why.js": why.encode(), "index.html": page.encode()}
         texts |= {CHUNK.format(k): text.encode() for k, text in enumerate(chunks(walk) if streams else ())}
+        texts |= {DEPTH.format(row): text.encode() for row, text in enumerate(depth_scripts(walk))}
         write_files(out, lambda: texts | {name: (BUILT / name).read_bytes() for name in (SCRIPT, LICENCES)})
-        for left in set(out.glob(CHUNK.format("*"))) - {out / name for name in texts}:
+        for left in {*out.glob(CHUNK.format("*")), *out.glob(DEPTH.format("*"))} - {out / name for name in texts}:
             left.unlink()
     return View(out / "index.html")
 

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 from builders.chromium import chromium
+from builders.far_bake import far_bake, far_walk
 from viewcell.data.buildings.office import make_office
 from viewcell.data.scene import OPAQUE
 from viewcell.verify.rays.embree import embree_scene
@@ -535,3 +536,30 @@ def test_what_cannot_be_read_is_said(browser, folder, tmp_path, what):
         data.write_text(f'{head}"packed":"{packed[: len(packed) // 2 // 4 * 4]}"}};')
     shown = Shown(browser, (spoiled / "index.html").as_uri())
     assert shown.run("return document.getElementById('note').textContent").startswith("This view cannot be shown: ")
+
+
+def test_depth_meshes_show_what_is_far(browser, built, tmp_path_factory):
+    """In place of what stands on them, from the middle of the view cell, but for a texel's worth at edges and light."""
+    out = tmp_path_factory.mktemp("far")
+    walk = far_walk(out, far_bake(out))
+    shown = Shown(browser, (view(walk, out / "balls.view").page).as_uri())
+    shown.choose("view", "inside")
+    shown.run("viewer.visitor.goTo(0); viewer.visitor.point = [-1, 0, 0]")
+    shown.choose("depth", True)
+    shown.until("return viewer.far.group.children.length > 0 && !viewer.restage && !viewer.stale")
+    assert shown.run("return viewer.far.triangles") == walk.depth_meshes.faces[0].sum()
+    near = set(walk.depth_meshes.near_levels(0)[0].tolist())
+    drawn = shown.run(
+        "return Array.from(viewer.stage.inside.shown.keys()).filter((id) => viewer.stage.inside.shown[id])"
+    )
+    assert set(drawn) == near and len(near) < 40
+    with_meshes = [shown.picture(yaw) for yaw in (0.0, 1.5, 3.0, 4.5)]
+    shown.choose("depth", False)
+    shown.until("return viewer.far.group.children.length === 0 && !viewer.restage && !viewer.stale")
+    plain = [shown.picture(yaw) for yaw in (0.0, 1.5, 3.0, 4.5)]
+    shown.choose("mode", "set")
+    background = plain[0][2, 2]
+    for one, other in zip(with_meshes, plain, strict=True):
+        there, wanted = ((np.abs(picture - background) > 12).any(axis=2) for picture in (one, other))
+        assert wanted.sum() > 1000 and (there != wanted).sum() < 0.1 * wanted.sum()
+    assert shown.complaints() == []

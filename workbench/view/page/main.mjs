@@ -3,6 +3,7 @@
 import { Ahead } from "./ahead.mjs";
 import { Database } from "./database.mjs";
 import { eyeSees } from "./eye.mjs";
+import { Far } from "./far.mjs";
 import { Inquiry } from "./inquiry.mjs";
 import { Keys } from "./keys.mjs";
 import { Labels } from "./labels.mjs";
@@ -28,9 +29,11 @@ class Viewer {
     this.canvas = document.getElementById("canvas");
     this.stage = new Stage(this.canvas, database);
     this.levels = new Levels(database);
+    this.far = new Far(database, this.stage.inside.colours, () => (this.restage = true), (error) => this.panel.note(error.message));
+    this.stage.scene.add(this.far.group);
     this.numbers = new Numbers(document.getElementById("plot"));
     this.chosen = {
-      view: "both", mode: "set", colours: "verdicts", outlines: false, wedge: false, labels: true, freeze: false, speed: this.visitor.speed, target: 0, cache: 64, pace: 1,
+      view: "both", mode: "set", colours: "verdicts", outlines: false, wedge: false, labels: true, depth: true, freeze: false, speed: this.visitor.speed, target: 0, cache: 64, pace: 1,
     };
     const [low, high] = [this.stage.bounds[2], this.stage.bounds[5] + 0.1];
     this.panel = new Panel(database, [low, high], (name, value) => this.choose(name, value));
@@ -86,6 +89,7 @@ class Viewer {
     if (code === "KeyM") next("mode", MODES);
     if (code === "KeyC") next("colours", COLOURS);
     if (code === "KeyN") this.choose("labels", !this.chosen.labels);
+    if (code === "KeyT") this.choose("depth", !this.chosen.depth);
     if (code === "KeyG") this.choose("wedge", !this.chosen.wedge);
     if (code === "Minus" || code === "Equal") this.stage.zoom(code === "Minus" ? 1.15 : 1 / 1.15);
     if (code === "KeyQ" || code === "KeyE") this.stage.swing(code === "KeyQ" ? -40 : 40, 0);
@@ -203,7 +207,12 @@ class Viewer {
       if (item < 0) missing++;
       return item;
     };
-    stage.inside.show(shown, itemOf);
+    const row = this.far.show(this.chosen.depth && this.chosen.mode !== "whole" ? observer.cell : -1);
+    // What stands on depth meshes is drawn by them.
+    const standing = row < 0 ? [] : this.far.farOf(row);
+    const near = Uint8Array.from(shown);
+    for (const id of standing) near[id] = 0;
+    stage.inside.show(near, itemOf);
     this.wanted = [...coarsest, ...this.wanted];
     this.missing = missing;
     this.restage = false;
@@ -234,7 +243,7 @@ class Viewer {
     const potential = set?.potential.length ?? database.objects;
     const { cell } = observer;
     const name = cell < 0 ? "outside all cells" : `cell ${database.cellIds[cell]} ${database.head.cellNames[cell]}`;
-    this.triangles = this.stage.inside.triangles;
+    this.triangles = this.stage.inside.triangles + this.far.triangles;
     this.counts = { drawn, potential, objects: database.objects };
     if (this.potentialOf !== cell) [this.potentialOf, this.potentialTriangles] = [cell, set ? sum(set.potential) : whole];
     this.panel.say({

@@ -4,7 +4,7 @@ import { legend } from "./colours.mjs";
 
 const FIELDS = ["cell", "drawn", "triangles", "levels", "memory", "misses", "rate", "note", "why-what", "why-verdict", "why-text"];
 const VALUES = ["view", "mode", "colours", "height", "speed", "target", "cache", "pace"];
-const TICKS = ["outlines", "wedge", "labels", "freeze"];
+const TICKS = ["outlines", "wedge", "labels", "depth", "freeze"];
 
 export class Panel {
   /** Fill the page's fields; `chosen` hears of what is changed. */
@@ -26,6 +26,7 @@ export class Panel {
     this.inputs = Object.fromEntries([...VALUES, ...TICKS].map((name) => [name, byId(name)]));
     for (const name of VALUES) this.inputs[name].addEventListener("input", (event) => event.target.value && chosen(name, event.target.value));
     for (const name of TICKS) this.inputs[name].addEventListener("change", (event) => chosen(name, event.target.checked));
+    byId("depth").parentElement.hidden = !database.depthCells.length;
     const [low, high] = storeys;
     Object.assign(this.inputs.height, { min: low, max: high, step: (high - low) / 200, value: high });
     byId("record").addEventListener("click", () => chosen("record"));

@@ -60,6 +60,7 @@ export class Stage {
   light() {
     const sky = new HemisphereLight(0xffffff, 0x8d8577, 2.2);
     const sun = new DirectionalLight(0xffffff, 1.1);
+    sky.position.set(0, 0, 1);
     sun.position.set(0.5, -0.7, 1.2);
     for (const one of [sky, sun]) one.layers.enableAll();
     this.scene.add(sky, sun);
