@@ -78,6 +78,7 @@ class OccluderModel:
         certify: bool = False,
         rough: bool = False,
         bare: bool = False,
+        shields: "Shields | None" = None,
     ) -> "OccluderModel":
         """Copy a prepared model's occluders to the device.
 
@@ -89,6 +90,7 @@ class OccluderModel:
                 itself, also where another element stands against it.
             rough: strong rectangles alone, where lines are to hide; curtains of a large model take most of the time.
             bare: no regions and patches beside them, where there is no time to make those.
+            shields: regions and patches, if the same ones are on the device.
         """
         model, device = sights.model, sights.device
         regions = model.regions if shadows else no_regions()
@@ -99,7 +101,8 @@ class OccluderModel:
         if rough:
             walls = strong_blockers(walls, STRONG_M / model.scene.grid_m)
         smallest = tuple(round(size / model.scene.grid_m) for size in SMALLEST_M)
-        shields = device_shields(*((no_regions(), no_patches()) if bare else (regions, patches)), device)
+        if shields is None:
+            shields = device_shields(*((no_regions(), no_patches()) if bare else (regions, patches)), device)
         wanted = shadows and not rough and not certify
         own = find_own_frames(model.scene, model.large_closed, sights.cells, sights.plans) if wanted else []
         searches = tuple(FrameSearch.of(frame, device) for frame in own)

@@ -116,7 +116,8 @@ class ViewCellEngine:
             if self._ready or not (self.begin() and self.look(seconds)):
                 return self._ready
             if not self._options["shadows"] or self._prepared.make_curtains(seconds):
-                self.model, self._ready = OccluderModel.of(self._sights, **self._options), True
+                self.model = OccluderModel.of(self._sights, **self._options, shields=self._rough.shields)
+                self._ready = True
             return self._ready
 
     def compile(self) -> None:

@@ -88,6 +88,11 @@ class Measured:
         """Visibility of one cell that the budget reached [ms]."""
         return 1000 * self.phases["flood"] / max(1, self.bounded)
 
+    @property
+    def overestimate(self) -> float:
+        """Potential over seen of bounded cells; not a number where nothing was seen."""
+        return self.potential / self.seen if self.seen else np.nan
+
     def columns(self) -> list[str]:
         """One row of the table."""
         each = max(1, self.bounded)
@@ -103,7 +108,7 @@ class Measured:
             f"{self.peak_gb:.2f}",
             f"{self.potential / each:,.0f}",
             f"{self.seen / each:,.0f}",
-            f"{self.potential / self.seen:.2f}" if self.seen else "-",
+            f"{self.overestimate:.2f}" if self.seen else "-",
             f"{100 * self.kept:.2g}",
             f"{self.bounded:,}",
             commit(),
@@ -181,20 +186,27 @@ def draw(rows: list[Measured], path: Path) -> None:
 
 
 def exponents(rows: list[Measured]) -> list[str]:
-    """Slopes of log cost over log triangles by least squares, a line for each scene with several sizes."""
+    """Slopes of logarithms of costs over that of triangles by least squares, a line for each scene of several sizes.
+
+    Sizes at which nothing was seen have no overestimate, and tell nothing of how it grows.
+    """
+    costs = {
+        "before the first cell": lambda row: row.before_s,
+        "a cell": lambda row: row.cell_ms,
+        "memory": lambda row: row.peak_gb,
+        "overestimate": lambda row: row.overestimate,
+        "kept share": lambda row: row.kept,
+    }
     lines = []
     for name in dict.fromkeys(row.scene for row in rows):
-        own = [row for row in rows if row.scene == name]
-        sizes = [row.triangles for row in own]
-        if len(set(sizes)) < 2:
-            continue
-        costs = {
-            "before the first cell": [row.before_s for row in own],
-            "a cell": [row.cell_ms for row in own],
-            "memory": [row.peak_gb for row in own],
-        }
-        slopes = ", ".join(f"{cost} {fit(sizes, values)[0]:.2f}" for cost, values in costs.items())
-        lines.append(f"{name}, exponents in triangles: {slopes}")
+        slopes = []
+        for cost, of in costs.items():
+            own = [row for row in rows if row.scene == name and np.isfinite(of(row))]
+            sizes = [row.triangles for row in own]
+            if len(set(sizes)) > 1:
+                slopes.append(f"{cost} {fit(sizes, [of(row) for row in own])[0]:.2f}")
+        if slopes:
+            lines.append(f"{name}, exponents in triangles: {', '.join(slopes)}")
     return lines
 
 

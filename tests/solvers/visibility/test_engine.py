@@ -9,6 +9,7 @@ from viewcell.data.prepared import PreparedModel
 from viewcell.data.rows import Rows
 from viewcell.data.store.blocks import read_block, write_block
 from viewcell.data.verdict import Verdict
+from viewcell.solvers.visibility import occluders
 from viewcell.solvers.visibility.engine import Part, join_objects, unknown_rows
 from viewcell.solvers.visibility.graph_engine import GraphEngine
 from viewcell.solvers.visibility.portal_engine import PortalEngine
@@ -149,3 +150,13 @@ def test_joined_objects_are_ordered():
     rows = join_objects(parts)
     assert rows.source.tolist() == [0] * 3 + [1] * 3 + [2] * 3 and rows.target.tolist() == [0, 1, 2] * 3
     assert (rows.verdict == Verdict.UNKNOWN).all()
+
+
+@pytest.mark.parametrize("certify", [False, True])
+def test_regions_and_patches_are_copied_once(house, monkeypatch, certify):
+    """What hides at once hides with curtains beside it, too."""
+    made, copy = [], occluders.device_shields
+    monkeypatch.setattr(occluders, "device_shields", lambda *args: made.append(args) or copy(*args))
+    engine = ViewCellEngine(house[0], CELLS, certify=certify)
+    assert engine.begin() and engine.prepare() and engine.prepare()
+    assert len(made) == 1 and len(made[0][0].axis)

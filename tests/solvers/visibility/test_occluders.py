@@ -207,7 +207,7 @@ def test_unusable_settings_are_refused(office, settings, wanted, tmp_path):
 
 
 def test_the_method_of_projection_points_wants_view_cells(office, tmp_path):
-    with pytest.raises(InputError, match="cells: expected octree or a table"):
+    with pytest.raises(InputError, match="cells: expected octree, walkways or a table"):
         bake(office, tmp_path / "no.bake", settings=Settings(method="vlod", cells="portals"))
 
 

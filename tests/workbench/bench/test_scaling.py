@@ -20,8 +20,15 @@ def test_every_row_has_all_columns():
 
 def test_exponents_are_those_of_the_costs():
     phases = {"read": 4.0, "view cells": 4.0, "prepare": 8.0, "flood": 6.0}
-    rows = [ROW, replace(ROW, triangles=16_000, phases=phases, peak_gb=16.0), replace(ROW, scene="city")]
-    assert exponents(rows) == ["plant, exponents in triangles: before the first cell 0.50, a cell 0.00, memory 1.00"]
+    more = replace(ROW, triangles=16_000, phases=phases, peak_gb=16.0, potential=32, kept=0.125)
+    unseen = replace(ROW, triangles=16_000, potential=0, seen=0)
+    assert exponents([ROW, more, replace(ROW, scene="city")]) == [
+        "plant, exponents in triangles: before the first cell 0.50, a cell 0.00, memory 1.00, overestimate 0.50, "
+        "kept share -0.50"
+    ]
+    assert exponents([ROW, unseen]) == [
+        "plant, exponents in triangles: before the first cell 0.00, a cell 0.00, memory 0.00, kept share 0.00"
+    ]
 
 
 def test_cells_lie_in_the_spaces():
