@@ -27,7 +27,10 @@ run: install
 	$(BIN)/viewcell make office --out out/office.scene --overwrite
 	$(BIN)/viewcell bake out/office.scene --out out/office --overwrite
 	$(BIN)/viewcell verify out/office
+	# Where npm could not be reached there is no viewer; the report is.
+	-$(BIN)/viewcell view out/office --out out/office.view --overwrite --no-open
 	$(BIN)/viewcell report out/office
+	@echo "open in a browser: $$(ls out/office.view/index.html 2>/dev/null || echo out/office/report/report.html)"
 
 # An office of the size of Soda Hall, from the model to a walk that is checked (out/soda.tour), and to the papers' tables
 # with all policies, a triangle as large as published (out/papers.tour).

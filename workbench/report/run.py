@@ -1,5 +1,6 @@
 """Look at a bake: plans of its storeys, sets of cells, and the numbers, as Markdown and PNG and as one HTML page."""
 
+import os
 import re
 import shutil
 import tempfile
@@ -73,8 +74,10 @@ def report(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
-            _write(bake, chosen, told, Path(scratch))
-            (Path(scratch) / "report.html").write_text(page(bake, model_name(bake), drawn, told), encoding="utf-8")
+            viewer = _viewer(bake, folder)
+            _write(bake, chosen, told, viewer, Path(scratch))
+            html = page(bake, model_name(bake), drawn, told, viewer)
+            (Path(scratch) / "report.html").write_text(html, encoding="utf-8")
             for made in sorted(Path(scratch).iterdir()):
                 shutil.move(made, folder / made.name)
     except OSError as error:
@@ -123,10 +126,23 @@ def _potential_counts(bake: "BakeFolder") -> np.ndarray:
     return bake.cell_sets.sizes - np.where(bake.graph.inhabitable, bake.graph.cell_count - bake.graph.tile_count, 0)
 
 
-def _write(bake: "BakeFolder", chosen: dict[int, str], told: tuple[dict | None, list[str]], folder: Path) -> None:
+def _viewer(bake: "BakeFolder", folder: Path) -> str | None:
+    """Address of the bake's view from a folder on, if `viewcell view` has written one beside the bake."""
+    found = Path(bake.folder).with_suffix(".view") / "index.html"
+    return Path(os.path.relpath(found, folder)).as_posix() if found.is_file() else None
+
+
+def _write(
+    bake: "BakeFolder",
+    chosen: dict[int, str],
+    told: tuple[dict | None, list[str]],
+    viewer: str | None,
+    folder: Path,
+) -> None:
     painter = Painter(bake.graph, bake.scene, bake.grid_m, whole=not speaks_of_cells(bake))
     name = model_name(bake)
-    lines = [f"# {name}", ""]
+    walk = f"[Walk through it](<{viewer}>)" if viewer else f"`viewcell view {Path(bake.folder).name}` walks through it"
+    lines = [f"# {name}", "", f"{walk} in a browser.", ""] if bake.scene else [f"# {name}", ""]
     kept, warnings = told
     for text in warnings:
         lines += [f"> **Warning:** {text}.", ""]

@@ -67,6 +67,7 @@ def page(
     title: str,
     curves: "Curves | None" = None,
     told: tuple[dict | None, list[str]] | None = None,
+    viewer: str | None = None,
 ) -> str:
     """The page, complete in itself.
 
@@ -75,13 +76,16 @@ def page(
         title: the model's name.
         curves: of time against error, if there are any.
         told: as from `told_worth`, if it is known already.
+        viewer: where a view of the bake is, from the page on, if there is one.
     """
     folder = files(__package__) / "page"
     parts = {"script": join_modules(folder, "main.mjs"), "own_style": (folder / "report.css").read_text("utf-8")}
     data = json.dumps(page_data(bake, title, curves, told), separators=(",", ":"), allow_nan=False)
     # In a script element only "<" could end or open anything.
     parts["data"] = data.replace("<", "\\u003c")
-    return fill(folder, "report.html", title=title, **{name: Markup(text) for name, text in parts.items()})
+    return fill(
+        folder, "report.html", title=title, viewer=viewer, **{name: Markup(text) for name, text in parts.items()}
+    )
 
 
 def page_data(

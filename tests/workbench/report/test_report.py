@@ -1,5 +1,7 @@
 """Reports: what they say, and where the pictures put things."""
 
+import re
+
 import numpy as np
 import pytest
 from builders import small_house
@@ -188,3 +190,17 @@ def test_the_caption_and_the_table_agree(house, tmp_path):
     text = report(house, cells=[0], out=tmp_path).read_text()
     kind = "inhabitable" if house.graph.inhabitable[4] else "wall, sliver or exterior"
     assert f"{known - 1} cells seen, itself included, 1 unknown" in text and f"| cell 4 | {kind} cell |" in text
+
+
+def test_a_report_leads_to_the_view_that_is_there(house, tmp_path):
+    """Beside the bake; where there is none, the report says how to make one, and nothing leads nowhere."""
+    text = report(house, out=tmp_path / "a").read_text()
+    assert f"`viewcell view {house.folder.name}` walks through it in a browser." in text
+    assert "Walk through it" not in (tmp_path / "a" / "report.html").read_text()
+    there = house.folder.with_suffix(".view") / "index.html"
+    there.parent.mkdir()
+    there.write_text("")
+    path = report(house, out=tmp_path / "b" / "deep")
+    (address,) = re.findall(r"\[Walk through it\]\(<(.*)>\) in a browser", path.read_text())
+    assert (path.parent / address).resolve() == there.resolve()
+    assert f'<a href="{address}">Walk through it</a>' in path.with_name("report.html").read_text()

@@ -34,8 +34,12 @@ export class Batch {
     });
     material.onBeforeCompile = (shader) => {
       shader.uniforms.backs = this.backs;
-      shader.fragmentShader = `uniform bool backs;\n${shader.fragmentShader}`.replace("#include <color_fragment>",
-        "#include <color_fragment>\nif (backs && !gl_FrontFacing) diffuseColor.rgb = vec3(0.6, 0.19, 0.38);");
+      // Differences of neighbouring pixels, by which faces are shaded, can vanish on a very large one: such are grounds.
+      shader.fragmentShader = `uniform bool backs;\n${shader.fragmentShader}`
+        .replace("#include <color_fragment>",
+          "#include <color_fragment>\nif (backs && !gl_FrontFacing) diffuseColor.rgb = vec3(0.6, 0.19, 0.38);")
+        .replace("#include <normal_fragment_begin>",
+          "#include <normal_fragment_begin>\nif (!(dot(normal, normal) > 0.5)) normal = (viewMatrix * vec4(0.0, 0.0, 1.0, 0.0)).xyz;");
     };
     const room = ids.length ? ROOM : 3;
     const mesh = new BatchedMesh(Math.max(1, ids.length), room, 2 * room, material);

@@ -287,7 +287,7 @@ class Viewer {
       const { left, width } = this.stage.skyPart(this.chosen.view);
       this.labels.draw(this.stage.sky, left, this.chosen.labels ? width : 0, this.canvas.clientHeight, this.chosen.height);
       if (moves) this.numbers.add(elapsed, this.triangles);
-      this.panel.say({ rate: `${this.numbers.rate.toFixed(0)} frames a second` });
+      this.panel.say({ rate: this.numbers.rate ? `${this.numbers.rate.toFixed(0)} frames a second` : "" });
       this.panel.plot(this.numbers, this.levels.target);
       this.turned = turned;
       this.stale = false;

@@ -13,7 +13,7 @@ export class Numbers {
 
   /** A frame was drawn, so long after the one before [ms]. */
   add(ms, triangles) {
-    if (ms > PAUSE) return;
+    if (ms <= 0 || ms > PAUSE) return;
     this.times = [...this.times.slice(1 - FRAMES), ms];
     this.triangles = [...this.triangles.slice(1 - FRAMES), triangles];
   }

@@ -44,10 +44,11 @@ export class Stage {
     this.marks = new Marks(database.maze, [INSIDE, ABOVE], INSIDE);
     this.scene.add(this.marks.group);
     this.head.layers.set(ABOVE);
-    this.land = new Mesh(new CircleGeometry(4 * this.size(), 64), new MeshBasicMaterial({ color: 0xc9cfc0 }));
+    this.land = new Mesh(new CircleGeometry(4 * this.size(), 64), new MeshBasicMaterial({ depthWrite: false }));
     const b = this.bounds;
-    // A little below the model, lest the two fight for pixels.
-    this.land.position.set((b[0] + b[3]) / 2, (b[1] + b[4]) / 2, b[2] - 0.002 * this.size());
+    this.land.position.set((b[0] + b[3]) / 2, (b[1] + b[4]) / 2, b[2]);
+    // Drawn first and without a depth it is behind all else: depths of so large a triangle are not exact.
+    this.land.renderOrder = -1;
     this.land.layers.enable(ABOVE);
     this.scene.add(this.land, this.head, ...Object.values(this.lines).map((one) => one.mesh));
   }
