@@ -20,8 +20,6 @@ from ...data.store.walk_folder import GEOMETRY, WalkFolder
 
 KINDS = {"uint8": "u1", "uint16": "u2", "uint32": "u4", "int32": "i4", "float32": "f4"}
 ROW = 12
-# A box of what is nowhere.
-NOWHERE = np.array([1, 1, 1, -1, -1, -1], np.float32) * 1e9
 # About so many chunks, but none smaller or larger than this [bytes].
 CHUNKS = 256
 CHUNK_BYTES = (4_096, 262_144)
@@ -55,6 +53,7 @@ def contents(walk: WalkFolder, *, streams: bool = False) -> str:
         "cellNames": [name or "" for name in walk.cells["name"].to_pylist()],
         "claimsCells": walk.claims_cells,
         "streams": streams,
+        "grid": walk.grid_m,
         "bounds": _bounds(_boxes(walk.objects)),
     }
     return script("viewcellData", head, arrays)
@@ -96,10 +95,11 @@ def _objects(walk: WalkFolder) -> dict[str, np.ndarray]:
     table = walk.objects
     starts, items = walk.object_items
     matrices = np.array(table["transform"].to_pylist(), np.float64).reshape(-1, 16)[:, :ROW]
-    boxes = _boxes(table)
+    boxes = walk.boxes
     colours = table["colour"].fill_null(0).to_numpy().astype(np.uint32)
     return {
-        "objectBoxes": np.where(np.isnan(boxes), NOWHERE, boxes),
+        # In columns, low corners and then extents, they take three fifths of the bytes.
+        "objectSteps": np.concatenate([boxes[:, 0].T, (boxes[:, 1] - boxes[:, 0]).T]).astype(np.int32),
         "transforms": matrices.astype(np.float32),
         "clear": np.array([role == Role.TRANSPARENT.value for role in table["role"].to_pylist()], np.uint8),
         "ground": np.array(_ground(table), np.uint8),

@@ -125,6 +125,7 @@ def test_chunks_are_neither_small_nor_large():
 
 
 def test_boxes_of_objects(given, walk):
-    _, arrays = given
-    boxes = arrays["objectBoxes"].reshape(-1, 2, 3)
-    assert np.allclose(boxes, walk.boxes * walk.grid_m, atol=1e-5)
+    head, arrays = given
+    assert head["grid"] == walk.grid_m
+    low, extent = arrays["objectSteps"].reshape(2, 3, -1)
+    assert np.array_equal(np.stack([low.T, (low + extent).T], axis=1), walk.boxes)

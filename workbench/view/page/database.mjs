@@ -6,6 +6,19 @@ import { decode } from "./runs.mjs";
 // Corners lie on a grid, up to half a step from where they are placed [m].
 const GRID = 1e-3;
 
+/** Boxes of objects [m], 6 numbers each, from columns of low corners and of extents in steps; of what is nowhere, none. */
+function boxesOf(steps, count, grid) {
+  const out = new Float32Array(6 * count);
+  for (let id = 0; id < count; id++) {
+    for (let k = 0; k < 3; k++) {
+      const [low, extent] = [steps[k * count + id], steps[(3 + k) * count + id]];
+      out[6 * id + k] = extent < 0 ? Infinity : low * grid;
+      out[6 * id + 3 + k] = extent < 0 ? -Infinity : (low + extent) * grid;
+    }
+  }
+  return out;
+}
+
 export class Database {
   constructor(head, arrays) {
     Object.assign(this, arrays);
@@ -20,6 +33,7 @@ export class Database {
     this.shapes = new Map();
     this.held = new Map();
     this.reach = new Map();
+    this.objectBoxes = boxesOf(this.objectSteps, this.objects, head.grid);
     this.chunks = this.chunkStarts.length - 1;
     this.chunkIds = Array.from({ length: this.chunks }, (_, chunk) => chunk);
     this.chunkOf = new Uint32Array(this.itemOffsets.length);

@@ -29,6 +29,26 @@ test("the nearest of many, in whatever order, is found although boxes leave some
   }
 });
 
+test("a near one is found behind a far one, on any side", () => {
+  for (const axis of [0, 1, 2]) {
+    for (const sign of [1, -1]) {
+      const shapes = [6, 2, 4].map((far) => [0, 1, 2].flatMap((n) => {
+        const corner = [0.5, 0.5, 0.5];
+        corner[(axis + 1) % 3] += 0.1 * n;
+        corner[axis] = sign * far + (sign > 0 ? 1 : 0);
+        return corner;
+      }));
+      const box = (id) => [0, 3].flatMap((end) => [0, 1, 2].map((k) =>
+        Math[end ? "max" : "min"](...[0, 3, 6].map((n) => shapes[id][n + k]))));
+      const to = [0.5, 0.5, 0.5];
+      to[axis] = 1;
+      const from = [0.5, 0.5, 0.5];
+      from[axis] = 0;
+      assert.deepEqual(clearance(from, to, [0, 1, 2], box, (id) => shapes[id]).distance, 2);
+    }
+  }
+});
+
 test("nothing is near where there is nothing", () => {
   assert.equal(clearance([0, 0, 0], [1, 1, 1], [], () => EVERYWHERE, () => []), null);
 });

@@ -30,6 +30,9 @@ test("slow frames allow more, quick ones less, within bounds", () => {
   assert.equal(levels.tolerance, 64);
   for (let k = 0; k < 200; k++) levels.heard(5);
   assert.equal(levels.tolerance, 0.5);
-  for (let k = 0; k < 50; k++) levels.heard(15);
+  // In between it stays what it is.
+  levels.tolerance = 4;
+  levels.average = 15;
   assert.equal(levels.heard(15), false);
+  assert.equal(levels.tolerance, 4);
 });
