@@ -11,6 +11,7 @@ ELSE = {
     "workbench/bake/test_levels.py": "levels of detail through a whole bake",
     "workbench/report/test_in_browser.py": "the page as a person uses it",
     "workbench/report/test_page_modules.py": "runs the modules' own tests in Node",
+    "workbench/view/test_depth.py": "depth meshes in the view's folder and in its page",
     "workbench/view/test_in_browser.py": "the view as a person uses it",
     "workbench/view/test_page_modules.py": "runs the modules' own tests in Node",
 }
