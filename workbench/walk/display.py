@@ -30,6 +30,7 @@ from ...solvers.walk.set_items import Shelves
 from .far import NONE, FarFaces
 from .level_choice import LevelChoice
 
+NO_FACES = np.zeros(0, np.int64)
 # A level that deviates by less than this on the screen is good enough.
 PIXELS = 1.0
 
@@ -140,7 +141,7 @@ class Display:
         self.known = Known.of(walk)
         graph = replace(walk.graph, inhabitable=self.known.has)
         self._eye = eye_model(graph, walk.boxes, walk.grid_m, self.known.potential, CPU)
-        self._budget = levels.cost.budget_ns(target_ms)
+        self._budget, self._pixels = levels.cost.budget_ns(target_ms), screen.width * screen.height
         kinds = walk.objects["kind"].to_pylist()
         self._benefit = levels.benefit_of(set(kinds))
         self._importance = importance_of(kinds, self._benefit)
@@ -193,24 +194,36 @@ class Display:
         candidates = candidates_of(self._importance, self.tuples, sightings, self.screen, self._benefit)
         which = candidates.tuple_id
         costs = self._levels.cost.object_ns(self.tuples.primitives[which], candidates.pixels, self._factors[which])
-        limits = np.maximum(self.limits(eye, objects), self.far.near(row, objects)[1])
-        faces = np.zeros(0, np.int64)
+        limits, faces, far_ns = self.limits(eye, objects), NO_FACES, 0
         if row != NONE:
+            limits = np.maximum(limits, self.far.near(row, objects)[1])
             faces = self.far.in_view(row, eye, path.axes()[at], self.screen)
-        pixels = np.full(len(faces), self.screen.width * self.screen.height / max(1, len(faces)))
-        far_ns = self._levels.cost.object_ns(self.far.triangles(faces), pixels, np.ones(len(faces)))
+            far_ns = int(
+                self._levels.cost.object_ns(self.far.triangles(faces), self._pixels / max(1, len(faces))).sum()
+            )
         problem = self._within(frame_problem(sightings, candidates, before), candidates, limits)
-        found = self._keeper.choose(problem, candidates, costs, max(0, self._budget - int(far_ns.sum())))
+        found = self._keeper.choose(problem, candidates, costs, max(0, self._budget - far_ns))
         lods = np.full(len(objects), NOTHING)
         lods[found.sightings] = self.tuples.lod[which[found.picked]]
-        own_ns = self._levels.cost.frame_s * (1 + self._levels.cost.margin) * 1e9 + far_ns.sum()
+        own_ns = self._levels.cost.frame_s * (1 + self._levels.cost.margin) * 1e9 + far_ns
         finest = np.maximum.reduceat(costs, candidates.starts[:-1]) if len(objects) else costs
-        none = np.zeros(len(faces), np.int64)
-        return Shown(
-            np.append(objects, faces), np.append(lods, none), np.append(sightings.pixels, pixels), 0,
-            np.append(limits, none), int(own_ns + finest.sum()), int(own_ns + costs[found.picked].sum()),
-            found.switches, found.dropped, (0.0, 0.0), row, (0, 0), int(self.far.triangles(faces).sum()),
+        shown = Shown(
+            objects, lods, sightings.pixels, 0, limits, int(own_ns + finest.sum()),
+            int(own_ns + costs[found.picked].sum()), found.switches, found.dropped, (0.0, 0.0), row, (0, 0), 0,
         )  # fmt: skip
+        return self._with(shown, faces) if len(faces) else shown
+
+    def _with(self, shown: Shown, faces: np.ndarray) -> Shown:
+        """A frame with faces of depth meshes, which have one level, and the screen between them."""
+        none = np.zeros(len(faces), np.int64)
+        return replace(
+            shown,
+            objects=np.append(shown.objects, faces),
+            lods=np.append(shown.lods, none),
+            pixels=np.append(shown.pixels, np.full(len(faces), self._pixels / len(faces))),
+            limits=np.append(shown.limits, none),
+            mesh_triangles=int(self.far.triangles(faces).sum()),
+        )
 
     def in_place(self, path: CameraPath, at: int, holders: np.ndarray, objects: np.ndarray) -> np.ndarray:
         """What is drawn for the objects that a frame's eye may see: near ones, then faces in view of depth meshes."""
