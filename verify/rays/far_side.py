@@ -30,6 +30,8 @@ class FarCheck:
     Attributes:
         texels: that were looked at, each from an eye of its own.
         over: of them, those drawn farther from where they are than the bound.
+        tenths: how many were off by less than a tenth of the bound, by one to two, and so on; the last ones are `over`;
+            shape (11,), int64.
         worst: the most that any was off, as part of the bound.
         rays: cast from eyes in the cell.
         nothing: of them, those that leave the model.
@@ -42,6 +44,7 @@ class FarCheck:
 
     texels: int
     over: int
+    tenths: np.ndarray
     worst: float
     rays: int
     nothing: int
@@ -173,15 +176,15 @@ class _Judge:
         self._unit = (self._half - 1) * side.reach
         self._allowed = side.texel_error + SLANT
 
-    def texels(self, eyes: np.ndarray, rng: np.random.Generator) -> tuple[int, int, float]:
-        """Texels looked at, those off by more than the bound, and the most that any is off as part of the bound."""
+    def texels(self, eyes: np.ndarray, rng: np.random.Generator) -> tuple[int, int, np.ndarray, float]:
+        """Of texels; see `FarCheck`."""
         side, half = self._side, self._half
         # Texels beyond the face's edges are there so that faces overlap.
         inner = np.zeros(side.ids.shape, bool)
         inner[:, 1:-1, 1:-1] = True
         shown = np.flatnonzero((side.ids >= 0) & inner)
         if not len(shown) or not len(eyes):
-            return 0, 0, 0.0
+            return 0, 0, np.zeros(11, np.int64), 0.0
         face, row, column = np.unravel_index(rng.choice(shown, len(eyes)), side.ids.shape)
         aside = np.stack([column + 0.5 - half, half - 0.5 - row, np.full(len(row), half - 1)], axis=1) / (half - 1)
         way = np.einsum("ni,nij->nj", aside, FACES[face])
@@ -197,7 +200,8 @@ class _Judge:
         true, seen = (way * np.where(both, along, 1.0)[:, None] - eye for along in (depth, placed))
         off = np.arctan2(np.linalg.norm(np.cross(true, seen), axis=1), (true * seen).sum(axis=1)) * (half - 1)
         off = np.where(both, np.maximum(off - SINGLE, 0) / side.error, np.inf)
-        return len(off), int((off > 1).sum()), float(off.max())
+        tenths = np.bincount(np.ceil(10 * np.minimum(off, 1.05) - 1).clip(0).astype(int), minlength=11)
+        return len(off), int((off > 1).sum()), tenths, float(off.max())
 
     def eyes(self, eyes: np.ndarray, way: np.ndarray) -> tuple[int, ...]:
         """Rays by what they meet first; see `FarCheck`."""

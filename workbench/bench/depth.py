@@ -22,11 +22,13 @@ from ...solvers.depth_meshes.mesh import depth_mesh
 from ...solvers.levels.benefit import find_sightings
 from ...verify.rays.far_side import FarCheck, check_far_side
 from ..export.sets import model_of
+from ..files import write_files
 from ..pack.depth import ALL, DepthSettings
 from ..pack.run import pack
 from ..summary import table
 from ..walk.run import walk
 from ..walk.settings import WalkSettings
+from ..walk.tally import Walked
 from .lines import NONE, Line
 
 # View cells that are measured, at most; texels and rays that judge each.
@@ -172,8 +174,23 @@ def reduction_lines(bake: BakeFolder, measured: list[CellMeasure]) -> list[Line]
     ]
 
 
-def graph_lines(bake: BakeFolder, folder: Path, triangles: int) -> list[Line]:
-    """Graphs 1 and 3 in numbers: a look around in one view cell after another, with and without meshes."""
+@dataclass(frozen=True)
+class LookAround:
+    """Looks around in one view cell after another, prefetched as published.
+
+    Attributes:
+        plain: without depth meshes.
+        warm: with them, and a cache that holds everything.
+        by_cache: with smaller ones, by their size [bytes].
+    """
+
+    plain: Walked
+    warm: Walked
+    by_cache: dict[int, Walked]
+
+
+def look_around(bake: BakeFolder, folder: Path, triangles: int) -> LookAround:
+    """Pack a bake with depth meshes, and look around."""
     cells = np.flatnonzero(bake.graph.inhabitable)[:CELLS]
     middles = bake.graph.cells[cells].mean(axis=1) * bake.grid_m
     eyes = np.repeat(middles[np.argsort(middles[:, 0], kind="stable")], FRAMES, axis=0)
@@ -181,44 +198,91 @@ def graph_lines(bake: BakeFolder, folder: Path, triangles: int) -> list[Line]:
     path = CameraPath(eyes, np.arange(count) * 360 / FRAMES % 360, np.zeros(count), np.arange(count) / 10)
     database = pack(bake, folder / "depth.walk", depth=DepthSettings(ALL, triangles))
     settings = WalkSettings(policy="mmr", screen=SCREEN, target_ms=1000.0, cache_bytes=10**9)
-    plain = walk(database, path, settings=replace(settings, depth_meshes=False))
-    warm = walk(database, path, settings=settings)
+    return LookAround(
+        walk(database, path, settings=replace(settings, depth_meshes=False)),
+        walk(database, path, settings=settings),
+        {size: walk(database, path, settings=replace(settings, cache_bytes=size)) for size in CACHES},
+    )
+
+
+def graph_lines(look: LookAround) -> list[Line]:
+    """Graphs 1 and 3 in numbers."""
+    plain, warm = look.plain.shown, look.warm.shown
     out = [
         Line(
             "triangles of a frame, as geometry",
             NONE,
-            f"{plain.shown['chosen_polygons'].mean():,.0f}, {plain.shown['chosen_polygons'].max():,} at most",
+            f"{plain['chosen_polygons'].mean():,.0f}, {plain['chosen_polygons'].max():,} at most",
             "sets, view and a pixel's levels",
         ),
         Line(
             "likewise, with depth meshes",
             NONE,
-            f"{warm.shown['chosen_polygons'].mean():,.0f}, {warm.shown['chosen_polygons'].max():,} at most",
+            f"{warm['chosen_polygons'].mean():,.0f}, {warm['chosen_polygons'].max():,} at most",
         ),
         Line(
             "frames a second (Graph 1)",
             "10 to 30",
-            f"{1e3 / warm.shown['chosen_ms'].mean():.0f}",
-            f"modelled, software renderer; {1e3 / plain.shown['chosen_ms'].mean():.0f} as geometry",
+            f"{1e3 / warm['chosen_ms'].mean():.0f}",
+            f"modelled, software renderer; {1e3 / plain['chosen_ms'].mean():.0f} as geometry",
         ),
     ]
-    for size in CACHES:
-        found = walk(database, path, settings=replace(settings, cache_bytes=size)).policies[0].columns
-        missing = 100 * (found["missing"] > 0).mean()
+    for size, walked in look.by_cache.items():
+        columns = walked.policies[0].columns
         out.append(
             Line(
                 f"MB read with a cache of {size / 1e6:g} MB (Graph 3)",
                 "flat from 140 MB on" if size == CACHES[-1] else NONE,
-                f"{found['read_bytes'].sum() / 1e6:.1f}",
-                f"something missing in {missing:.1f} % of {count} frames",
+                f"{columns['read_bytes'].sum() / 1e6:.1f}",
+                f"something missing in {100 * (columns['missing'] > 0).mean():.1f} % of {len(walked.path)} frames",
             )
         )
     return out
 
 
+def graph_figure(look: LookAround, measured: list[CellMeasure]) -> bytes:
+    """Frame times, errors, bytes against cache size, and reads along the path, as a PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from ..pages import COLOURS, png
+
+    figure = Figure(figsize=(11.0, 7.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    (times, errors), (caches, reads) = figure.subplots(2, 2)
+    frames = np.arange(len(look.warm.path))
+    for values, label, colour in (
+        (look.plain.shown["finest_ms"], "sets, at the finest levels", "#bbbbbb"),
+        (look.plain.shown["chosen_ms"], "sets, levels of a pixel", COLOURS[0]),
+        (look.warm.shown["chosen_ms"], "depth meshes beyond cull boxes", COLOURS[1]),
+    ):
+        times.plot(frames, values, color=colour, linewidth=1, label=label)
+    times.set(xlabel="frame", ylabel="ms, modelled", ylim=(0, None), title="Graph 1: time of a frame")
+    times.legend(fontsize=8, frameon=False)
+    tenths = np.sum([one.check.tenths for one in measured], axis=0)
+    errors.bar(
+        np.arange(11) * 0.1 + 0.05, 100 * tenths / tenths.sum(), width=0.09, color=[COLOURS[0]] * 10 + ["#b00020"]
+    )
+    errors.axvline(1.0, color="#777777", linestyle="--", linewidth=1)
+    errors.set(
+        xlabel="part of the proved bound", ylabel="% of texels", title="Texels off, from random eyes of their cell"
+    )
+    sizes = np.array([*look.by_cache]) / 1e6
+    read = [walked.policies[0].columns["read_bytes"].sum() / 1e6 for walked in look.by_cache.values()]
+    caches.plot(sizes, read, marker="o", color=COLOURS[0])
+    caches.set(xlabel="cache [MB]", ylabel="MB read", ylim=(0, None), xlim=(0, None), title="Graph 3: bytes read")
+    size = CACHES[len(CACHES) // 2]
+    reads.bar(frames, look.by_cache[size].policies[0].columns["read_bytes"] / 1e3, width=1.0, color=COLOURS[0])
+    reads.set(xlabel="frame", ylabel="kB", title=f"Graph 4: reads, with a cache of {size / 1e6:g} MB")
+    for axes in (times, errors, caches, reads):
+        axes.spines[["top", "right"]].set_visible(False)
+    return png(figure)
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of `run`."""
     parser.add_argument("bake", metavar="BAKE", help="of small view cells, such as --cells walkways, with --lods")
+    parser.add_argument("--plot", metavar="PNG", help="also draw the paper's graphs there")
     parser.add_argument("--triangles", type=int, default=TRIANGLES, help=f"of a view cell; {TRIANGLES:,} by default")
 
 
@@ -229,6 +293,10 @@ def run(options: argparse.Namespace) -> int:
     lines = cell_lines(measured, int(bake.graph.inhabitable.sum()))
     if measured:
         with tempfile.TemporaryDirectory() as folder:
-            lines += reduction_lines(bake, measured) + graph_lines(bake, Path(folder), options.triangles)
+            look = look_around(bake, Path(folder), options.triangles)
+        lines += reduction_lines(bake, measured) + graph_lines(look)
+        if options.plot:
+            plot = Path(options.plot)
+            write_files(plot.parent, lambda: {plot.name: graph_figure(look, measured)})
     print(table(("", "published", "ours", ""), [(row.what, row.published, row.ours, row.note) for row in lines]))
     return 0

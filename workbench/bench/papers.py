@@ -41,7 +41,7 @@ from ..bake.settings import Settings
 from ..baked import Bake
 from ..pack.run import pack
 from ..walk.settings import ALL, WalkSettings
-from .depth import CELLS, TRIANGLES, VIEWS, cell_lines, graph_lines, measure_cells, reduction_lines
+from .depth import CELLS, TRIANGLES, VIEWS, cell_lines, graph_lines, look_around, measure_cells, reduction_lines
 from .lines import NONE, Line, mean_max
 from .occlusion import sample_cells
 from .storage import AS_PACKED, SAMPLED_ORDER, SCHEME, TOUR, measure_storage
@@ -313,7 +313,7 @@ def mmr(folder: Path) -> dict[str, list[Line]]:
     return {
         f"Table 1: reduction of polygons, means of {VIEWS} views in {triangles}": reduction_lines(made, measured),
         "Section 6: depth meshes": cell_lines(measured, CELLS),
-        "Graphs 1 and 3, with the published prefetching": graph_lines(made, folder, TRIANGLES),
+        "Graphs 1 and 3, with the published prefetching": graph_lines(look_around(made, folder, TRIANGLES)),
     }
 
 

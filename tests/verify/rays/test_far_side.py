@@ -29,6 +29,7 @@ def with_meshes(side, change):
 def test_honest_meshes_are_where_they_say(honest):
     found = judged(*honest)
     assert found.texels == TEXELS and found.over == 0 and 0 < found.worst <= 1
+    assert found.tenths.sum() == TEXELS and found.tenths[10] == 0 < found.tenths[:5].sum()
     assert found.nothing + found.near + found.on_images + found.uncovered == found.rays == RAYS
     # Boxes in the open: most is on images, little hides behind others, and what is there is where it should be.
     assert found.on_images > 4 * found.uncovered > 0
@@ -38,7 +39,7 @@ def test_honest_meshes_are_where_they_say(honest):
 def test_meshes_elsewhere_are_told(honest):
     scene, side = honest
     nearer = judged(scene, with_meshes(side, lambda mesh: replace(mesh, parallax=mesh.parallax * np.float32(1.3))))
-    assert nearer.over > 0.1 * TEXELS and nearer.misplaced > 0
+    assert nearer.over > 0.1 * TEXELS and nearer.misplaced > 0 and nearer.tenths[10] == nearer.over
     wider = judged(scene, with_meshes(side, lambda mesh: replace(mesh, pixels=mesh.pixels[:, ::-1])))
     assert wider.over > 0.1 * TEXELS and wider.misplaced > 0.1 * wider.on_images
     stated = judged(scene, replace(side, error=side.error / 100))

@@ -22,7 +22,8 @@ def test_view_cells_are_measured(made):
     measured = depth.measure_cells(made, TRIANGLES, Device())
     assert [one.cell for one in measured] == [0, 1]
     for one in measured:
-        assert one.check.texels == one.check.rays == 500 and one.check.over == 0
+        assert one.check.texels == one.check.rays == 500 == one.check.tenths.sum() and one.check.over == 0
+        assert one.check.tenths[10] == 0 and one.check.tenths.argmax() < 9
         assert one.bytes > 0 and one.coarse_texels > 0 and one.seconds[0] > 0
     lines = {line.what: line for line in depth.cell_lines(measured, 2)}
     assert lines["texels off by more"].ours == "0 of 1,000"
@@ -44,8 +45,10 @@ def test_what_is_left_is_what_is_drawn(made):
     assert left < 40 * 1280 * (1 - shares[0])
 
 
-def test_the_command(made, capsys):
-    assert main(["depth", str(made.folder), "--triangles", str(TRIANGLES)]) == 0
+def test_the_command(made, tmp_path, capsys):
+    plot = tmp_path / "graphs.png"
+    assert main(["depth", str(made.folder), "--triangles", str(TRIANGLES), "--plot", str(plot)]) == 0
+    assert plot.read_bytes().startswith(b"\x89PNG")
     said = capsys.readouterr().out
     assert "MB read with a cache of 2 MB (Graph 3)" in said and "likewise, with depth meshes" in said
     assert all(len(line) <= 160 for line in said.splitlines())
