@@ -606,3 +606,40 @@ def test_depth_meshes_show_what_is_far(browser, built, tmp_path_factory):
         there, wanted = ((np.abs(picture - background) > 12).any(axis=2) for picture in (one, other))
         assert wanted.sum() > 1000 and (there != wanted).sum() < 0.1 * wanted.sum()
     assert shown.complaints() == []
+
+
+def test_one_jumps_to_a_room_by_a_double_click_and_to_an_object_by_a_key(shown):
+    """The middle of the floor of each room, as the picture from above has it; and a room's desk."""
+    shown.choose("view", "above")
+    cells = shown.run("return Array.from(viewer.database.viewCells)")
+    reached = 0
+    for cell in cells:
+        shown.choose("cell", cells[0])
+        shown.run(
+            """
+            const [cell] = arguments;
+            const { stage, database, canvas } = viewer;
+            const box = database.cellBoxes.subarray(6 * cell, 6 * cell + 6);
+            const floor = stage.head.position.clone();
+            floor.set((box[0] + box[3]) / 2, (box[1] + box[4]) / 2, box[2]).project(stage.sky);
+            const [x, y] = [(floor.x + 1) / 2 * canvas.clientWidth, (1 - floor.y) / 2 * canvas.clientHeight];
+            const { left, top } = canvas.getBoundingClientRect();
+            const at = { clientX: left + x, clientY: top + y, bubbles: true };
+            canvas.dispatchEvent(new MouseEvent("dblclick", at));
+            """,
+            cell,
+        )
+        reached += shown.run("return viewer.visitor.cell") == cell
+    # Walls and furniture stand before some of them.
+    assert reached > len(cells) / 2
+    shown.choose("cell", cells[0])
+    desk = shown.run("return viewer.database.head.names.findLastIndex((name) => /desk/i.test(name))")
+    shown.choose("object", desk)
+    shown.run("viewer.pressed('KeyJ')")
+    held = shown.run(
+        "const [at, box] = [viewer.visitor.cell, viewer.database.boxOf(arguments[0])];"
+        "const middle = [0, 1].map((axis) => (box[axis] + box[axis + 3]) / 2);"
+        "return viewer.database.maze.holds(at, [...middle, box[5] + 0.3])",
+        desk,
+    )
+    assert held and shown.run("return viewer.visitor.cell") != cells[0]

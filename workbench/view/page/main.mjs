@@ -62,6 +62,10 @@ class Viewer {
     const look = this.keys.look.bind(this.keys);
     this.keys.look = (right, down) => (this.onSky ? this.stage.swing(right, down) : look(right, -down));
     this.canvas.addEventListener("pointerdown", (event) => (this.onSky = this.isSky(event)));
+    this.canvas.addEventListener("dblclick", (event) => {
+      const found = this.isSky(event) && this.stage.pick(event.offsetX, event.offsetY, this.chosen.view);
+      if (found) this.jump(found.point);
+    });
     addEventListener("resize", () => (this.stale = true));
     const dark = matchMedia("(prefers-color-scheme: dark)");
     const dress = () => {
@@ -96,6 +100,11 @@ class Viewer {
     if (code === "BracketLeft" || code === "BracketRight") this.choose("height", this.chosen.height + (code === "BracketLeft" ? -0.3 : 0.3));
     if (code === "KeyO") this.choose("outlines", !this.chosen.outlines);
     if (code === "KeyF") this.choose("freeze", !this.chosen.freeze);
+    if (code === "KeyJ" && this.inquiry.asked) {
+      const { kind, id } = this.inquiry.asked;
+      const box = kind === "object" ? this.database.boxOf(id) : this.database.cellBoxes.subarray(6 * id, 6 * id + 6);
+      this.jump([0, 1, 2].map((axis) => (box[axis] + box[axis + 3]) / 2));
+    }
     if (code === "KeyR") this.choose("record");
     if (code === "KeyY") this.why(this.canvas.clientWidth / (this.chosen.view === "both" ? 4 : 2), this.canvas.clientHeight / 2);
     if (code === "Escape") {
@@ -111,6 +120,15 @@ class Viewer {
     const again = found && asked?.kind === "object" && asked.id === found.id;
     const room = again ? this.database.maze.cellAt([found.point[0], found.point[1], found.point[2] + 0.5]) : -1;
     return this.inquiry.ask(found && (room >= 0 ? { kind: "cell", id: room } : { kind: "object", id: found.id }));
+  }
+
+  /** Stand in the view cell that holds a point, or eyes above it. */
+  jump([x, y, z]) {
+    const { database } = this;
+    const cells = [0.5, 0, 1.5].map((up) => database.maze.cellAt([x, y, z + up]));
+    const found = cells.find((cell) => database.rowOfCell.has(cell));
+    if (found === undefined) this.panel.note("no view cell is there");
+    else this.choose("cell", found);
   }
 
   /** Take a choice: of the panel, a key, or a test. */
