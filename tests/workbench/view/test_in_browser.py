@@ -425,7 +425,8 @@ def test_overlays_of_the_wedge_and_of_back_faces(shown):
     shown.choose("view", "inside")
     plain = shown.picture(0.3)
     shown.choose("colours", "backs")
-    assert shown.run("return viewer.stage.inside.backs.value")
+    # No eye of the cell sees what faces away from all of it.
+    assert (np.abs(shown.picture(0.3) - plain).max(axis=2) > 8).mean() < 1e-3
     shown.choose("view", "above")
     backs = shown.picture(0.3)
     shown.choose("colours", "model")
@@ -438,6 +439,48 @@ def test_overlays_of_the_wedge_and_of_back_faces(shown):
     shown.choose("wedge", False)
     shown.choose("view", "inside")
     assert (np.abs(shown.picture(0.3) - plain).max(axis=2) > 8).mean() < 1e-3
+    assert shown.complaints() == []
+
+
+def test_stabbing_lines_are_the_bakes(shown, office):
+    """As many as the cell sees others, from it to them; when they are not asked for, none."""
+    shown.choose("sequences", True)
+    rows = office.cell_to_cell.to_pylist()
+    for cell in shown.run("return [...viewer.database.viewCells]")[::2]:
+        shown.choose("cell", cell)
+        own = shown.run("return viewer.database.cellIds[viewer.cell]")
+        seen = [row for row in rows if row["cell_id"] == own != row["reached_cell_id"] and row["verdict"] == "visible"]
+        lines = "viewer.stage.lines.stabs.mesh.geometry.attributes.position.array"
+        shown.until(f"return {lines}.length === {6 * len(seen)}")
+        found = np.reshape(shown.run(f"return [...{lines}]"), (-1, 6))
+        low, high = office.graph.cells[own] * office.grid_m
+        assert len(seen) and (found[:, :3] >= low - 1e-3).all() and (found[:, :3] <= high + 1e-3).all()
+        assert shown.run("return viewer.stage.lines.stabbed.mesh.visible")
+    shown.choose("sequences", False)
+    shown.until(f"return {lines}.length === 0")
+
+
+def test_edges_are_darker_and_go_with_what_has_them(browser, streamed):
+    shown = Shown(browser, (streamed / "index.html").as_uri())
+    shown.choose("view", "inside")
+    shown.until(SETTLED)
+    # Lines take the processor long; who draws with one is not asked to wait.
+    assert shown.run("return viewer.stage.slow && !viewer.chosen.edges")
+    plain = shown.picture(0.3)
+    shown.choose("edges", True)
+    lined = shown.picture(0.3).sum(axis=2) - plain.sum(axis=2)
+    assert (lined < -20).mean() > 0.002 and (lined > 20).mean() < 1e-4
+    total = shown.run("return viewer.database.chunkIds.reduce((sum, k) => sum + viewer.database.chunkBytes(k), 0)")
+    shown.choose("cache", total / 4e6)
+    for cell in shown.run("return [...viewer.database.viewCells]"):
+        shown.choose("cell", cell)
+        shown.until(SETTLED)
+    kept, left = shown.run(
+        "const [{ shapes, edges }] = viewer.stage.inside.parts;"
+        "return [edges.shapes.size, [...edges.shapes.keys()].filter((item) => !shapes.has(item)).length]"
+    )
+    assert kept > 0 and left == 0
+    shown.choose("edges", False)
     assert shown.complaints() == []
 
 

@@ -1,21 +1,23 @@
 // All objects as two draw calls, what is opaque and what is not: each shape once, each object a copy of one, at some level
 // of detail, that can be hidden or coloured by itself.
 
-import {
-  BatchedMesh, BufferAttribute, BufferGeometry, Color, DoubleSide, Matrix4, MeshLambertMaterial,
-} from "three";
+import { BatchedMesh, BufferAttribute, BufferGeometry, Color, Matrix4 } from "three";
 
 import { colourOf } from "./colours.mjs";
+import { Edges } from "./edges.mjs";
+import { Backs, faceMaterial } from "./faces.mjs";
 
 // Room to begin with [vertices], and what it grows by.
 const ROOM = 50_000;
 const GROWTH = 1.6;
+// Share of what colours mean: the rest is an object's own, so that one knows it again.
+const MEANING = 0.7;
 
 export class Batch {
   /** Objects of a database; `layer` is that of the cameras that see them, `planes` cut them. */
   constructor(database, layer, planes = []) {
     this.database = database;
-    this.backs = { value: false };
+    this.backs = new Backs();
     this.ids = Array.from({ length: database.objects }, (_, id) => id);
     this.parts = [false, true].map((clear) => this.part(clear, layer, planes));
     this.colours = this.ids.map((id) =>
@@ -28,19 +30,7 @@ export class Batch {
   part(clear, layer, planes) {
     const { database } = this;
     const ids = this.ids.filter((id) => !!database.clear[id] === clear);
-    const material = new MeshLambertMaterial({
-      side: DoubleSide, flatShading: true, clippingPlanes: planes,
-      ...(clear ? { transparent: true, opacity: 0.35, depthWrite: false } : {}),
-    });
-    material.onBeforeCompile = (shader) => {
-      shader.uniforms.backs = this.backs;
-      // Differences of neighbouring pixels, by which faces are shaded, can vanish on a very large one: such are grounds.
-      shader.fragmentShader = `uniform bool backs;\n${shader.fragmentShader}`
-        .replace("#include <color_fragment>",
-          "#include <color_fragment>\nif (backs && !gl_FrontFacing) diffuseColor.rgb = vec3(0.6, 0.19, 0.38);")
-        .replace("#include <normal_fragment_begin>",
-          "#include <normal_fragment_begin>\nif (!(dot(normal, normal) > 0.5)) normal = (viewMatrix * vec4(0.0, 0.0, 1.0, 0.0)).xyz;");
-    };
+    const material = faceMaterial(clear, planes, this.backs);
     const room = ids.length ? ROOM : 3;
     const mesh = new BatchedMesh(Math.max(1, ids.length), room, 2 * room, material);
     const nothing = new BufferGeometry();
@@ -48,22 +38,29 @@ export class Batch {
     nothing.setIndex([0, 1, 2]);
     // A copy always has a shape: of an object that is not there, a point.
     const none = mesh.addGeometry(nothing);
+    const edges = new Edges(clear ? 0 : ids.length, layer, planes);
     const matrix = new Matrix4();
     const copies = new Map();
     for (const id of ids) {
       const copy = mesh.addInstance(none);
       mesh.setMatrixAt(copy, matrix.set(...database.transforms.subarray(12 * id, 12 * id + 12), 0, 0, 0, 1));
       mesh.setVisibleAt(copy, false);
+      if (!clear) edges.add(matrix);
       copies.set(id, copy);
     }
     mesh.layers.set(layer);
     mesh.frustumCulled = false;
     mesh.sortObjects = clear;
-    return { mesh, copies, ids, none, shapes: new Map(), users: new Map() };
+    return { mesh, edges: clear ? null : edges, copies, ids, none, shapes: new Map(), users: new Map() };
   }
 
   get meshes() {
     return this.parts.map((part) => part.mesh);
+  }
+
+  /** All that is drawn; one can point at `meshes` alone. */
+  get all() {
+    return [...this.meshes, ...this.parts.flatMap(({ edges }) => (edges ? [edges.mesh] : []))];
   }
 
   /** The object that a copy in one of the meshes is. */
@@ -78,15 +75,15 @@ export class Batch {
         const item = wanted[id] ? itemOf(id) : -1;
         if (item >= 0 && item !== this.items[id]) this.change(part, id, copy, item);
         const visible = item >= 0 ? 1 : 0;
-        if (visible !== this.shown[id]) part.mesh.setVisibleAt(copy, !!visible);
+        if (visible !== this.shown[id]) see(part, copy, !!visible);
         this.shown[id] = visible;
       }
     }
   }
 
-  /** Colour what is seen from behind, or do not. */
-  markBacks(marked) {
-    this.backs.value = marked;
+  /** Draw edges of what is opaque, or do not. */
+  drawEdges(wanted) {
+    for (const { edges } of this.parts) edges?.draw(wanted);
   }
 
   /** Triangles of what is shown. */
@@ -100,18 +97,24 @@ export class Batch {
     part.users.get(this.items[id])?.delete(id);
     this.items[id] = item;
     part.mesh.setGeometryIdAt(copy, this.shapeOf(part, item));
+    part.edges?.change(copy, item, () => this.geometryOf(item));
   }
 
   shapeOf(part, item) {
     if (!part.shapes.has(item)) {
-      const { corners, faces } = this.database.item(item);
-      const geometry = new BufferGeometry();
-      geometry.setAttribute("position", new BufferAttribute(corners, 3));
-      geometry.setIndex(new BufferAttribute(Uint32Array.from(faces), 1));
-      makeRoom(part.mesh, corners.length / 3, faces.length);
+      const geometry = this.geometryOf(item);
+      makeRoom(part.mesh, geometry.attributes.position.count, geometry.index.count);
       part.shapes.set(item, part.mesh.addGeometry(geometry));
     }
     return part.shapes.get(item);
+  }
+
+  geometryOf(item) {
+    const { corners, faces } = this.database.item(item);
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new BufferAttribute(corners, 3));
+    geometry.setIndex(new BufferAttribute(Uint32Array.from(faces), 1));
+    return geometry;
   }
 
   /** Forget items, which are no longer in memory; what was drawn as one of them is not until it is shown anew. */
@@ -119,9 +122,11 @@ export class Batch {
     for (const part of this.parts) {
       for (const item of items) {
         if (!part.shapes.has(item)) continue;
-        for (const id of part.users.get(item) ?? []) {
+        const users = [...(part.users.get(item) ?? [])];
+        part.edges?.drop(item, users.map((id) => part.copies.get(id)));
+        for (const id of users) {
           part.mesh.setGeometryIdAt(part.copies.get(id), part.none);
-          part.mesh.setVisibleAt(part.copies.get(id), false);
+          see(part, part.copies.get(id), false);
           this.items[id] = -1;
           this.shown[id] = 0;
         }
@@ -136,9 +141,20 @@ export class Batch {
   paint(of) {
     const colour = new Color();
     for (const { mesh, copies } of this.parts) {
-      for (const [id, copy] of copies) mesh.setColorAt(copy, colour.setRGB(...(of(id) ?? this.colours[id]), "srgb"));
+      for (const [id, copy] of copies) mesh.setColorAt(copy, colour.setRGB(...mixed(this.colours[id], of(id)), "srgb"));
     }
   }
+}
+
+/** A meaning's colour over an object's own, or that alone for null. */
+function mixed(own, meaning) {
+  return meaning ? own.map((x, k) => x + MEANING * (meaning[k] - x)) : own;
+}
+
+/** Whether a copy is drawn. */
+function see({ mesh, edges }, copy, visible) {
+  mesh.setVisibleAt(copy, visible);
+  edges?.mesh.setVisibleAt(copy, visible);
 }
 
 /** Room in a mesh for a shape: where others were, or more. */

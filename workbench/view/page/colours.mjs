@@ -34,6 +34,6 @@ export function levelColour(level) {
 /** What each colour of a way to colour means, as pairs of a word and a colour. */
 export function legend(colours) {
   if (colours === "levels") return LEVELS.map((colour, level) => [level ? `${level}` : "level 0, the finest", colour]);
-  if (colours === "backs") return [["seen from behind", 0xcc79a7]];
+  if (colours === "backs") return [["faces away from the view cell", 0x993061]];
   return Object.entries({ verdicts: VERDICTS, memory: MEMORY }[colours] ?? {});
 }

@@ -14,18 +14,22 @@ export class Inquiry {
   async ask(asked) {
     this.asked = asked;
     this.from = undefined;
-    if (asked && !this.reasons) {
-      this.loading ??= loadReasons();
-      try {
-        this.reasons = await this.loading;
-      } catch (error) {
-        this.loading = undefined;
-        this.panel.note(`No reason can be given: ${error.message}`);
-        return;
-      }
-    }
+    if (asked && !(await this.load())) return;
     this.clear();
     this.changed();
+  }
+
+  /** What the bake holds; null, and a word about it, where that cannot be read. */
+  async load() {
+    this.loading ??= loadReasons();
+    try {
+      this.reasons = await this.loading;
+    } catch (error) {
+      this.loading = undefined;
+      this.panel.note(`No reason can be given: ${error.message}`);
+      return null;
+    }
+    return this.reasons;
   }
 
   /** Answer anew from another cell. */

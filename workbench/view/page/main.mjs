@@ -33,7 +33,7 @@ class Viewer {
     this.stage.scene.add(this.far.group);
     this.numbers = new Numbers(document.getElementById("plot"));
     this.chosen = {
-      view: "both", mode: "set", colours: "verdicts", outlines: false, wedge: false, labels: true, depth: true, freeze: false, speed: this.visitor.speed, target: 0, cache: 64, pace: 1,
+      view: "both", mode: "set", colours: "verdicts", outlines: false, wedge: false, sequences: false, labels: true, edges: !this.stage.slow, depth: true, freeze: false, speed: this.visitor.speed, target: 0, cache: 64, pace: 1,
     };
     const [low, high] = [this.stage.bounds[2], this.stage.bounds[5] + 0.1];
     this.panel = new Panel(database, [low, high], (name, value) => this.choose(name, value));
@@ -92,6 +92,8 @@ class Viewer {
     if (code === "KeyV") next("view", VIEWS);
     if (code === "KeyM") next("mode", MODES);
     if (code === "KeyC") next("colours", COLOURS);
+    if (code === "KeyP") this.choose("sequences", !this.chosen.sequences);
+    if (code === "KeyX") this.choose("edges", !this.chosen.edges);
     if (code === "KeyN") this.choose("labels", !this.chosen.labels);
     if (code === "KeyT") this.choose("depth", !this.chosen.depth);
     if (code === "KeyG") this.choose("wedge", !this.chosen.wedge);
@@ -155,6 +157,7 @@ class Viewer {
     }
     const { chosen } = this;
     if (name === "freeze") this.frozen = value ? this.stage.hold(this.visitor) : this.stage.hold(null);
+    if (name === "edges") this.stage.edges(value);
     if (name === "speed") this.visitor.speed = chosen.speed;
     if (name === "pace") this.tour.speed = chosen.pace;
     if (name === "target") this.levels.target = chosen.target;
@@ -197,10 +200,22 @@ class Viewer {
     const { sides, axes } = database.maze;
     const portals = Array.from(axes, (_, k) => k).filter((k) => near.has(sides[2 * k]) && near.has(sides[2 * k + 1]));
     stage.outline(observer.cell, [...near], portals);
+    this.sequences();
     this.look();
     stage.all(chosen.colours);
     this.colour();
     this.cell = observer.cell;
+  }
+
+  /** Show stabbing lines of the cell, if they are asked for, as soon as they are here. */
+  async sequences() {
+    const { chosen, stage, inquiry } = this;
+    if (!chosen.sequences) return stage.sequences([]);
+    const reasons = await inquiry.load();
+    if (!reasons || !chosen.sequences) return undefined;
+    stage.sequences(reasons.sightlinesOf(this.observer.cell));
+    if (!reasons.held) this.panel.note("The view was made without its bake, so no stabbing line is held.");
+    return (this.stale = true);
   }
 
   /** Show what is kept, or what the eye sees of it, at the levels that are chosen and here. */
@@ -240,7 +255,7 @@ class Viewer {
   /** Colours, of the view from above or, for levels, of both. */
   colour() {
     const { stage, chosen, ahead, verdicts } = this;
-    stage.colour(chosen.colours, { verdicts, stateOf: (id) => ahead.stateOf(id, performance.now()) });
+    stage.colour(chosen.colours, { verdicts, stateOf: (id) => ahead.stateOf(id, performance.now()), cell: this.observer.cell });
     stage.range(chosen.colours === "memory" ? ahead.cells : []);
   }
 

@@ -4,7 +4,7 @@ import { legend } from "./colours.mjs";
 
 const FIELDS = ["cell", "drawn", "triangles", "levels", "memory", "misses", "rate", "note", "why-what", "why-verdict", "why-text"];
 const VALUES = ["view", "mode", "colours", "height", "speed", "target", "cache", "pace"];
-const TICKS = ["outlines", "wedge", "labels", "depth", "freeze"];
+const TICKS = ["outlines", "sequences", "wedge", "labels", "edges", "depth", "freeze"];
 
 export class Panel {
   /** Fill the page's fields; `chosen` hears of what is changed. */

@@ -45,6 +45,16 @@ export class Reasons {
     return { from: line.slice(0, 3), to: line.slice(3), portals };
   }
 
+  /** Sightlines from a cell to all other cells that it sees, as above. */
+  sightlinesOf(cell) {
+    const found = [];
+    for (let row = 0; row < (this.cellPairs?.length ?? 0) / 2; row++) {
+      const target = this.cellPairs[2 * row + 1];
+      if (this.cellPairs[2 * row] === cell && target !== cell) found.push(this.sightline("cell", cell, target));
+    }
+    return found;
+  }
+
   /** Proofs whose boxes meet a box, from a cell, and rectangles of all occluders that they name, 12 numbers each. */
   blockers(cell, box) {
     const named = new Set();

@@ -27,7 +27,7 @@ export class Stage {
     this.cut = new Plane(new Vector3(0, 0, -1), this.bounds[5] + 1);
     this.inside = new Batch(database, INSIDE);
     this.above = new Batch(database, ABOVE, [this.cut]);
-    this.scene.add(...this.inside.meshes, ...this.above.meshes);
+    this.scene.add(...this.inside.all, ...this.above.all);
     this.eye = new PerspectiveCamera(FOV, 1, 0.05, 2 * this.size());
     this.sky = new PerspectiveCamera(45, 1, 1, 8 * this.size());
     this.eye.up.set(0, 0, 1);
@@ -37,10 +37,10 @@ export class Stage {
     this.orbit = { turn: -0.9, rise: 0.9, away: 1.15 * this.size() };
     this.light();
     this.head = new Mesh(new SphereGeometry(0.35), new MeshBasicMaterial({ color: 0xd55e00 }));
-    const lines = { frustum: 0xd55e00, cell: 0xd55e00, cells: 0x0072b2, range: 0x0072b2, portals: 0x007a58, wedge: 0xcc79a7 };
-    const whole = ["frustum", "cell", "wedge"];
+    const lines = { frustum: 0xd55e00, cell: 0xd55e00, cells: 0x0072b2, range: 0x0072b2, portals: 0x007a58, wedge: 0xcc79a7, stabbed: 0x007a58, stabs: 0x009e73 };
+    const whole = ["frustum", "cell", "wedge", "stabbed", "stabs"];
     this.lines = Object.fromEntries(Object.entries(lines).map(([name, colour]) =>
-      [name, new Lines(colour, ABOVE, whole.includes(name) ? [] : [this.cut])]));
+      [name, new Lines(colour, ABOVE, whole.includes(name) ? [] : [this.cut], name === "stabs")]));
     this.marks = new Marks(database.maze, [INSIDE, ABOVE], INSIDE);
     this.scene.add(this.marks.group);
     this.head.layers.set(ABOVE);
@@ -59,7 +59,7 @@ export class Stage {
   }
 
   light() {
-    const sky = new HemisphereLight(0xffffff, 0x8d8577, 2.2);
+    const sky = new HemisphereLight(0xffffff, 0xb4b0a8, 2.1);
     const sun = new DirectionalLight(0xffffff, 1.1);
     sky.position.set(0, 0, 1);
     sun.position.set(0.5, -0.7, 1.2);
@@ -100,8 +100,9 @@ export class Stage {
     return database.itemNear(id, database.head.streams ? database.itemStarts[id + 1] - database.itemStarts[id] - 1 : 0);
   }
 
-  /** Colour by verdicts, memory or levels, or as the model is; `verdicts` by id, `stateOf(id)` in memory. */
-  colour(colours, { verdicts, stateOf }) {
+  /** Colour by verdicts, memory, levels or backs, or as the model is; `verdicts` by id, `stateOf(id)` in memory, of an eye
+   * in a `cell`. */
+  colour(colours, { verdicts, stateOf, cell }) {
     const { above, inside, database } = this;
     const level = (id) => database.items.indexOf(inside.items[id], database.itemStarts[id]) - database.itemStarts[id];
     const hidden = rgb(VERDICTS.hidden);
@@ -110,10 +111,30 @@ export class Stage {
       memory: (id) => rgb(MEMORY[stateOf(id)]),
       levels: (id) => (inside.shown[id] ? levelColour(level(id)) : hidden),
     }[colours];
-    for (const batch of [above, inside]) batch.markBacks(colours === "backs");
+    const box = cell < 0 ? null : database.cellBoxes.subarray(6 * cell, 6 * cell + 6);
+    for (const batch of [above, inside]) batch.backs.of(colours === "backs" ? box : null);
     above.paint(of ?? (() => null));
     if (colours === "levels" || this.painted) inside.paint(colours === "levels" ? of : () => null);
     this.painted = colours === "levels";
+  }
+
+  /** Draw edges, or do not. */
+  edges(wanted) {
+    for (const batch of [this.above, this.inside]) batch.drawEdges(wanted);
+  }
+
+  /** Whether the processor draws: it takes long for lines. */
+  get slow() {
+    const context = this.renderer.getContext();
+    const named = context.getExtension("WEBGL_debug_renderer_info");
+    return !!named && /swiftshader|llvmpipe|software/i.test(context.getParameter(named.UNMASKED_RENDERER_WEBGL));
+  }
+
+  /** Stabbing lines from a cell, and the portals that they pass, in sequence. */
+  sequences(lines) {
+    const portals = [...new Set(lines.flatMap((line) => line.portals))];
+    this.lines.stabbed.set(boxLines(portalBoxes(this.database.maze, portals)));
+    this.lines.stabs.set(new Float32Array(lines.flatMap(({ from, to }) => [...from, ...to])));
   }
 
   /** Lines around cells in range. */

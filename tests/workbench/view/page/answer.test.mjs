@@ -64,3 +64,9 @@ test("what is not held is said", () => {
   assert.equal(outside.verdict, null);
   assert.match(outside.text, /Nothing is claimed/);
 });
+
+test("all sightlines of a cell to others", () => {
+  assert.deepEqual(reasons(true).sightlinesOf(0).map(({ portals }) => portals), [[3, 4]]);
+  assert.deepEqual(reasons(true).sightlinesOf(1), []);
+  assert.deepEqual(new Reasons({ certified: null }, {}).sightlinesOf(0), []);
+});
