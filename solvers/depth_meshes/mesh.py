@@ -31,7 +31,7 @@ def depth_mesh(parallax: np.ndarray, shown: np.ndarray, error: float, *, most: i
         parallax: of each pixel [texels], shape (height, width), float64, finite, both sizes from 2 to 65,536.
         shown: whether it shows something, same shape, bool.
         error: texels that its parallax may be off by, > 0.
-        most: triangles at which to stop, whatever the error; None for none.
+        most: triangles at which to stop, or at one more, whatever the error; None for none.
 
     Returns:
         A mesh; its own `error` is what was found, at most some 1e-6 of the largest parallax, or half a PARALLAX_STEP
