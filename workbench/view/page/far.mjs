@@ -43,7 +43,7 @@ void main() {
   if (abs(255.0 * shown.a - own) > 0.5) discard;
   vec3 normal = normalize(cross(dFdx(world), dFdy(world)));
   if (dot(normal, cameraPosition - world) < 0.0) normal = -normal;
-  vec3 sky = 2.2 * mix(vec3(0.266, 0.235, 0.184), vec3(1.0), 0.5 * normal.z + 0.5);
+  vec3 sky = 2.1 * mix(vec3(0.456, 0.434, 0.392), vec3(1.0), 0.5 * normal.z + 0.5);
   vec3 light = mix(vec3(1.75, 1.73, 1.7), sky + 1.1 * max(dot(normal, sun), 0.0), 0.6);
   vec3 linear = mix(shown.rgb / 12.92, pow((shown.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, shown.rgb));
   gl_FragColor = vec4(linear * light * 0.31831, 1.0);
