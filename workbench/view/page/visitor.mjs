@@ -64,10 +64,11 @@ export class Visitor {
     if (Math.abs(rise) < 1e-4) return;
     const to = [this.point[0], this.point[1], this.point[2] + rise];
     const { maze } = this.database;
-    const cell = maze.follow(this.cell, this.point, to);
+    const cellAt = (z) => maze.follow(this.cell, this.point, [to[0], to[1], z]);
     // Under a room without a floor lies what nobody stands in, such as the space above a ceiling.
-    const stays = cell >= 0 && (maze.inhabitable[cell] || !maze.inhabitable[this.cell]);
-    if (stays) [this.point, this.cell] = [to, cell];
+    if (rise < 0 && maze.inhabitable[this.cell] && !maze.inhabitable[cellAt(ground + EYE)]) return;
+    const cell = cellAt(to[2]);
+    if (cell >= 0) [this.point, this.cell] = [to, cell];
   }
 
   /** A unit vector along the view. */

@@ -38,12 +38,13 @@ test("nobody falls out of a room to where nobody can stand, but down a stairwell
     assert.equal(visitor.cell, 0);
     assert.ok(Math.abs(visitor.point[2] - 0.65) < 1e-6, `${visitor.point}`);
   }
-  // Eyes of who stands on a ground that is lower still would be out of the room.
+  // Eyes of who stands on a ground that is lower still would be out of the room: they stay where they are.
   for (const [below, cell] of [[0, 0], [1, 1]]) {
     const database = { ...overSpace(below), boxOf: () => [0, 0, -1.9, 4, 4, -1.9] };
     database.trianglesOf = () => overSpace(below).trianglesOf().map((x, k) => (k % 3 === 2 ? -1.9 : x));
     const visitor = new Visitor(database);
     for (let k = 0; k < 100; k++) visitor.walk(0.1, 0, 0, 1);
     assert.equal(visitor.cell, cell);
+    assert.ok(Math.abs(visitor.point[2] - (cell ? -0.25 : 1.65)) < 1e-6, `${visitor.point}`);
   }
 });
