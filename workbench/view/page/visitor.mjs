@@ -9,13 +9,15 @@ export const TURN = 1.8; // radians a second by arrow keys
 const CLIMB = 3;
 // A step is cut into pieces that are shorter than any wall is thick.
 const PIECE = 0.1;
+// Cells that see so much of what the best one sees are as good to begin in.
+const ALMOST = 0.9;
 
 export class Visitor {
   constructor(database) {
     this.database = database;
     this.yaw = this.pitch = 0;
     this.speed = SPEED;
-    this.goTo(busiest(database));
+    this.goTo(startCell(database));
   }
 
   /** Stand in the middle of a cell, on its ground. */
@@ -61,7 +63,11 @@ export class Visitor {
     const rise = Math.sign(rest) * Math.min(Math.abs(rest), CLIMB * seconds);
     if (Math.abs(rise) < 1e-4) return;
     const to = [this.point[0], this.point[1], this.point[2] + rise];
-    const cell = this.database.maze.follow(this.cell, this.point, to);
+    const { maze } = this.database;
+    const cellAt = (z) => maze.follow(this.cell, this.point, [to[0], to[1], z]);
+    // Under a room without a floor lies what nobody stands in, such as the space above a ceiling.
+    if (rise < 0 && maze.inhabitable[this.cell] && !maze.inhabitable[cellAt(ground + EYE)]) return;
+    const cell = cellAt(to[2]);
     if (cell >= 0) [this.point, this.cell] = [to, cell];
   }
 
@@ -72,8 +78,11 @@ export class Visitor {
   }
 }
 
-/** The view cell from which most may be seen; -1 if there is none. */
-export function busiest(database) {
-  const size = (cell) => database.setOf(cell).potential.length;
-  return [...database.viewCells].reduce((best, cell) => (best < 0 || size(cell) > size(best) ? cell : best), -1);
+/** The largest of the view cells from which almost as much may be seen as from any; -1 if there is none. */
+export function startCell(database) {
+  const cells = [...database.viewCells];
+  const seen = (cell) => database.setOf(cell).potential.length;
+  const size = (cell) => [0, 1, 2].reduce((all, k) => all * (database.cellBoxes[6 * cell + 3 + k] - database.cellBoxes[6 * cell + k]), 1);
+  const most = cells.reduce((best, cell) => Math.max(best, seen(cell)), 0);
+  return cells.filter((cell) => seen(cell) >= ALMOST * most).reduce((best, cell) => (best < 0 || size(cell) > size(best) ? cell : best), -1);
 }
